@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.scripts import cli
-from handrail.scripts.commands import COMMANDS, GROUPS, Command
+from handrail.scripts.commands import COMMANDS, GROUPS
 
 _HELP = ("-h", "--help", cli.HELP_ALL)
 
@@ -18,11 +18,7 @@ def main() -> NoReturn:
     prefix, dash, name = program.partition("-")
     if prefix == "handrail" and dash:
         cli.run(lambda: _run(program, name, words))
-    cli.run(lambda: _run(f"handrail {words[0]}", *_split(words)) if words else _list_commands())
-
-
-def _split(words: list[str]) -> tuple[str, list[str]]:
-    return words[0], words[1:]
+    cli.run(lambda: _run(f"handrail {words[0]}", words[0], words[1:]) if words else _list_commands())
 
 
 def _run(program: str, name: str, words: list[str]) -> int | None:
@@ -33,27 +29,21 @@ def _run(program: str, name: str, words: list[str]) -> int | None:
         return cli.print_version("handrail")
     if name not in COMMANDS:
         raise unknown_name("command", name, COMMANDS)
-    command = COMMANDS[name]
-    if command.job is not None:
-        return command.job.run(cli.parse(command.job.config, program, words))
-    return _run_verb(program, command, words)
-
-
-def _run_verb(program: str, command: Command, words: list[str]) -> int | None:
-    """Run one of a command's verbs: the first word, or the second where a folder comes before it."""
+    verbs = COMMANDS[name].verbs
+    if "" in verbs:
+        return verbs[""].run(cli.parse(verbs[""].config, program, words))
     if cli.VERSION in words:
         return cli.print_version(program)
-    verb = next((word for word in words[:2] if word in command.verbs), "")
-    if verb:
+    # the verb is the first word, or the second where a folder comes before it
+    if verb := next((word for word in words[:2] if word in verbs), ""):
         rest = [word for place, word in enumerate(words) if place != words.index(verb)]
-        job = command.verbs[verb]
-        return job.run(cli.parse(job.config, f"{program} {verb}", rest))
-    if not words or words[0] in _HELP:
-        print(f"usage: {program} VERB [OPTIONS]\n\n{command.help}\n")
-        _print_lines({verb: job.help for verb, job in command.verbs.items()})
-        print(f"\n{program} VERB --help shows the flags.")
-        return 0
-    raise HandrailError(f"{program} {words[0]}: expected one of {', '.join(command.verbs)} (see --help)")
+        return verbs[verb].run(cli.parse(verbs[verb].config, f"{program} {verb}", rest))
+    if words and words[0] not in _HELP:
+        raise HandrailError(f"{program} {words[0]}: expected one of {', '.join(verbs)} (see --help)")
+    print(f"usage: {program} VERB [OPTIONS]\n\n{COMMANDS[name].help}\n")
+    _print_lines({verb: each.help for verb, each in verbs.items()})
+    print(f"\n{program} VERB --help shows the flags.")
+    return 0
 
 
 def _list_commands() -> int:

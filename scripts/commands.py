@@ -1,7 +1,7 @@
 """The commands, by what a person wants to do; a command imports its own parts alone."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from handrail.controllers.registry import resolved
@@ -10,8 +10,8 @@ ENTRY = "handrail.scripts.__main__:main"  # of all commands
 
 
 @dataclass(frozen=True)
-class Job:
-    """What a command, or one of its verbs, does."""
+class Verb:
+    """What a command, or one of its words, does."""
 
     help: str
     """One line."""
@@ -33,26 +33,24 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Command:
+class Program:
     """One command: `handrail-NAME`, or `handrail NAME`."""
 
     help: str
     """One line."""
-    job: Job | None = None
-    """What it does, if it has no verbs."""
-    verbs: Mapping[str, Job] = field(default_factory=dict)
-    """What it does, by the word that says it."""
+    verbs: Mapping[str, Verb]
+    """What it does, by the word that says it; what does one thing has it under the empty word."""
 
 
-def _alone(help: str, settings: str, body: str) -> Command:
-    return Command(help, Job(help, settings, body))
+def _alone(help: str, settings: str, body: str) -> Program:
+    return Program(help, {"": Verb(help, settings, body)})
 
 
-def _edit(config: str, help: str) -> Job:
-    return Job(help, f"datasets.editing.config:{config}", "scripts.dataset:edit")
+def _edit(config: str, help: str) -> Verb:
+    return Verb(help, f"datasets.editing.config:{config}", "scripts.dataset:edit")
 
 
-GROUPS: Mapping[str, Mapping[str, Command]] = {
+GROUPS: Mapping[str, Mapping[str, Program]] = {
     "try it": {
         "demo": _alone(
             "record five episodes and show what came out",
@@ -74,32 +72,32 @@ GROUPS: Mapping[str, Mapping[str, Command]] = {
         "replay": _alone(
             "run a recorded episode again, and measure the deviation",
             "collect.commands.config:ReplayConfig",
-            "scripts.session:replay",
+            "collect.commands.replay:replay",
         ),
-        "devices": Command(
+        "devices": Program(
             "gamepad, SpaceMouse, keyboard and leader arms at this computer",
-            verbs={
-                "list": Job(
+            {
+                "list": Verb(
                     "what is plugged in",
                     "collect.teleop_config:ListDevicesConfig",
                     "collect.commands.devices:list_devices",
                 ),
-                "test": Job(
+                "test": Verb(
                     "show what a device says",
                     "collect.teleop_config:ShowDeviceConfig",
                     "collect.commands.devices:show_device",
                 ),
-                "calibrate": Job(
+                "calibrate": Verb(
                     "which joint of a leader arm drives which joint of a robot",
                     "collect.teleop_config:CalibrateConfig",
                     "collect.devices.guided_calibration:calibrate",
                 ),
             },
         ),
-        "lekiwi": Command(
+        "lekiwi": Program(
             "a LeKiwi on the network",
-            verbs={
-                "host": Job(
+            {
+                "host": Verb(
                     "simulate one, in LeRobot's own protocol",
                     "collect.lekiwi.host_config:HostConfig",
                     "collect.lekiwi.host:serve",
@@ -113,13 +111,13 @@ GROUPS: Mapping[str, Mapping[str, Command]] = {
             "collect.commands.config:InspectConfig",
             "scripts.dataset:inspect",
         ),
-        "edit": Command(
+        "edit": Program(
             "change, repair, pack and send datasets; every column stays",
-            verbs={
+            {
                 "delete": _edit("DeleteConfig", "leave out some --episodes"),
                 "keep": _edit("KeepConfig", "leave out all but some --episodes"),
                 "split": _edit("SplitConfig", "write --parts into folders of their own"),
-                "merge": Job(
+                "merge": Verb(
                     "write several datasets into one",
                     "datasets.editing.pack_config:MergeConfig",
                     "scripts.dataset:pack",
@@ -127,17 +125,17 @@ GROUPS: Mapping[str, Mapping[str, Command]] = {
                 "trim": _edit("TrimConfig", "cut off what is idle at both ends"),
                 "relabel": _edit("RelabelConfig", "say with --label how --episodes ended"),
                 "rename": _edit("RenameConfig", "give the task another sentence, --task"),
-                "pack": Job(
+                "pack": Verb(
                     "write a dataset into few large files",
                     "datasets.editing.pack_config:PackConfig",
                     "scripts.dataset:pack",
                 ),
-                "repair": Job(
+                "repair": Verb(
                     "mend what a crash or a disk did",
                     "collect.commands.config:RepairConfig",
                     "scripts.dataset:repair",
                 ),
-                "push": Job(
+                "push": Verb(
                     "write its card, and send it to the hub or elsewhere",
                     "collect.commands.config:PushConfig",
                     "scripts.dataset:push",

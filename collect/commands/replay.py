@@ -1,7 +1,7 @@
 """Replays a recorded episode's commands and reports how far the motion deviates."""
 
-import contextlib
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,47 +9,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handrail.collect.operators.operator import View
+from handrail.collect.commands.config import ReplayConfig
 from handrail.collect.session.build import build_env
-from handrail.collect.session.film import VideoFile
-from handrail.collect.session.recorded import RecordedCommands, recorded_settings
-from handrail.collect.session.session import Session
+from handrail.collect.session.film import VideoFile, save_sheet
+from handrail.collect.session.recorded import recorded_settings
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.command import Command
 from handrail.datasets.format.metadata import CLIENT
+from handrail.datasets.presentation.table import Table
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.open_dataset import OpenDataset, open_dataset
-from handrail.datasets.recording.frames import Frame
 from handrail.datasets.recording.slice import TRIMMED
 
+_PICTURES = 8
+_HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts begun")
 _MOST_TRIMMED = 100_000  # frames; more is a number made up
+Pictures = list[NDArray[np.uint8]]
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What came out of a replay.
-
-    Attributes:
-        episode: its number.
-        names: of the observed state.
-        deviations: largest deviation of each number of the observed state over the episode, (s,).
-        final: deviation of each number at the end, (s,).
-        recorded_success: what the dataset says.
-        success: what happened now.
-        contacts: forbidden contacts that began now.
-        robot_client: the robot of LeRobot's that was driven through its client; empty if it was none.
-    """
+    """What came out of a replay."""
 
     episode: int
     names: tuple[str, ...]
+    """Of the observed state."""
     deviations: FloatArray
+    """Largest deviation of each number of the observed state over the episode, (s,)."""
     final: FloatArray
+    """Deviation of each number at the end, (s,)."""
     recorded_success: bool
     success: bool
     contacts: int
+    """Forbidden contacts that began now."""
     robot_client: str = ""
+    """The robot of LeRobot's that was driven through its client; empty if it was none."""
 
     @property
     def largest(self) -> float:
@@ -62,8 +58,40 @@ class Replay:
         tool = [index for index, name in enumerate(self.names) if name in ("tool.x", "tool.y", "tool.z")]
         return float(np.linalg.norm(self.final[tool]))
 
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its row of the table."""
+        return (
+            str(self.episode),
+            f"{self.largest:.2e}",
+            self.names[int(self.deviations.argmax())],
+            f"{self.tool_at_end:.2e}",
+            "yes" if self.success else "no",
+            "yes" if self.recorded_success else "no",
+            str(self.contacts),
+        )
 
-def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay, list[NDArray[np.uint8]]]:
+
+def replay(config: ReplayConfig) -> None:
+    """Run a recorded episode's commands again, or those of all, and print the deviation."""
+    replays, sheet = list[Replay](), Path(config.sheet).expanduser()
+    video = Path(config.video).expanduser() if config.video else None
+    with open_dataset(config.dataset.folder) as dataset:
+        for episode in range(len(dataset.rows)) if config.episode < 0 else [config.episode]:
+            pictures = _PICTURES if config.sheet else 0
+            found, taken = replay_one_of(dataset, episode, pictures, video, config.said)
+            replays.append(found)
+            if taken:
+                save_sheet(taken, sheet)
+    say = Terminal().print
+    say(Table(_HEADINGS, [each.cells for each in replays]))
+    for client in sorted({each.robot_client for each in replays if each.robot_client}):
+        say(f"Recorded through the client of {client}: replayed here in simulation, so it deviates.")
+    for written in filter(None, (config.sheet, config.video)):
+        say(f"Written: {written}")
+
+
+def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay, Pictures]:
     """Run the recorded commands of an episode in its environment, from the same seed.
 
     Args:
@@ -84,7 +112,7 @@ def replay_one_of(
     pictures: int = 0,
     video: Path | None = None,
     said: Collection[str] = (),
-) -> tuple[Replay, list[NDArray[np.uint8]]]:
+) -> tuple[Replay, Pictures]:
     """Run the recorded commands of an episode of an open dataset; see `replay_episode`.
 
     Args:
@@ -94,60 +122,52 @@ def replay_one_of(
         video: also film the whole episode to this .mp4 file.
         said: names of the command line, which the dataset may name as `module:name`.
     """
-    info, row = dataset.info, _row(dataset, episode)
+    info, row = dataset.info, dataset.row(episode)
+    where = f"episode {episode} of {info.root}"
+    if (seed := _count(row.get("seed"))) is None:
+        raise HandrailError(f"dataset {info.root}: expected one that handrail-record made, found no seed")
     frames = dataset.frames(episode, ["action", "observation.state"])
-    length = len(frames["action"])
-    skipped = _trimmed(row)  # the operator did nothing then, so the robot stands still
-    limit = (skipped + length - 0.5) / info.fps
+    actions, recorded = frames["action"], frames["observation.state"]
+    skipped = _count(row.get(TRIMMED), _MOST_TRIMMED) or 0  # the robot stood still then
+    still = np.append(np.zeros(actions.shape[1] - 1), actions[0, -1]).astype(actions.dtype)
+    limit = (skipped + len(actions) - 0.5) / info.fps
     config = replace(recorded_settings(row, said), cameras="", time_limit=limit)
-    env = build_env(config, info.fps, render=bool(pictures or video))
-    with contextlib.ExitStack() as stack:
-        stack.callback(env.close)
-        _check_state(frames["observation.state"], env, f"episode {episode} of {info.root}")
+    taken: Pictures = []
+    with ExitStack() as stack:
+        env = stack.enter_context(closing(build_env(config, info.fps, render=bool(pictures or video))))
+        _check_state(recorded, env, where)
         film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
-        moments = {skipped + each for each in _moments(length, pictures)}
-        camera, period = _Camera(moments, film), 1.0 / info.fps
-        recorded = RecordedCommands(_from_the_start(frames["action"], skipped), period)
-        session = Session(env, recorded, _Nobody(), [camera], control_period=period, record_period=period)
-        outcome = session.run(row["seed"])
-    states = camera.states[skipped:]
+        moments = skipped + np.linspace(0, len(actions) - 1, pictures).round().astype(int)
+
+        def see(frame: int) -> None:
+            picture = env.render() if film or frame in moments else None
+            if picture is not None and frame in moments:
+                taken.append(picture)
+            if picture is not None and film:
+                film.add(picture)
+
+        actions = np.vstack([np.tile(still, (skipped, 1)), actions])
+        states, contacts, success = _run(env, seed, actions, info.fps, see)
+    states = states[skipped:]
     if not states:
-        raise HandrailError(
-            f"episode {episode} of {info.root}: the task ended before the first recorded frame"
-        )
-    difference = np.abs(states - frames["observation.state"][: len(states)])
-    replay = Replay(
+        raise HandrailError(f"{where}: the task ended before the first recorded frame")
+    difference = np.abs(states - recorded[: len(states)])
+    found = Replay(
         episode=episode,
         names=env.agent_names,
         deviations=difference.max(axis=0),
         final=difference[-1],
         recorded_success=bool(row.get("success")),
-        success=outcome.success,
-        contacts=outcome.contact_onsets,
+        success=success,
+        contacts=contacts,
         robot_client=str(row.get(CLIENT) or ""),
     )
-    return replay, camera.taken
+    return found, taken
 
 
-def _row(dataset: OpenDataset, episode: int) -> dict[str, Any]:
-    row = dataset.row(episode)
-    if not is_count(row.get("seed")):
-        raise HandrailError(
-            f"dataset {dataset.info.root}: expected one that handrail-record made, found no seed"
-        )
-    return row
-
-
-def _trimmed(row: dict[str, Any]) -> int:
-    """Return how many frames `handrail-edit trim` has cut off at the beginning."""
-    cut = row.get(TRIMMED)
-    return cut if is_count(cut) and cut <= _MOST_TRIMMED else 0
-
-
-def _from_the_start(actions: np.ndarray, skipped: int) -> np.ndarray:
-    """Return actions, (T, n + 1), after some in which the robot stands still."""
-    still = np.append(np.zeros(actions.shape[1] - 1), actions[0, -1]).astype(actions.dtype)
-    return np.vstack([np.tile(still, (skipped, 1)), actions])
+def _count(value: Any, most: float = np.inf) -> int | None:
+    """Return what a line of metadata says, if that is a whole number in its range."""
+    return value if type(value) is int and 0 <= value <= most else None
 
 
 def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
@@ -160,42 +180,33 @@ def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
         )
 
 
-class _Nobody:
-    """Asks for nothing; an operator."""
+def _run(
+    env: HandrailEnv, seed: int, actions: np.ndarray, fps: float, see: Callable[[int], None]
+) -> tuple[list[FloatArray], int, bool]:
+    """Send the commands of an episode until it is over.
 
-    def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Begin an episode."""
+    Args:
+        env: of the episode; the robot may be sent several commands a frame.
+        seed: of the episode.
+        actions: velocities at the ends of the frames, and gripper, (T, n + 1).
+        fps: frames a second.
+        see: is told the number of every frame at its end.
 
-    def act(self, view: View) -> Intent:
-        """Return the intent of who touches nothing."""
-        return Intent(np.zeros(0), np.zeros(0, dtype=bool))
-
-
-def _moments(frames: int, pictures: int) -> set[int]:
-    """Return the frames of which pictures are taken, evenly over the episode."""
-    return set(np.linspace(0, frames - 1, pictures).round().astype(int).tolist())
-
-
-class _Camera:
-    """Keeps the states, takes pictures at some moments, and films if there is a file; an observer."""
-
-    def __init__(self, moments: set[int], film: VideoFile | None) -> None:
-        self._moments, self._film = moments, film
-        self.taken: list[NDArray[np.uint8]] = []
-        self.states: list[FloatArray] = []
-
-    def begin(self, env: HandrailEnv, seed: int) -> None:
-        """Take note of the environment."""
-        self._env = env
-
-    def see(self, frame: Frame) -> None:
-        """Keep the state, and take the picture of this moment, if somebody wants it."""
-        wanted = len(self.states) in self._moments
-        self.states.append(frame.state)
-        picture = self._env.render() if wanted or self._film else None
-        if picture is None:
-            return
-        if wanted:
-            self.taken.append(picture)
-        if self._film:
-            self._film.add(picture)
+    Returns:
+        The states before the frames, how many contacts began, and whether the task was done.
+    """
+    states, onsets, contacts = list[FloatArray](), 0, 0
+    observation, info = env.reset(seed=seed)
+    for frame, action in enumerate(actions.astype(np.float64)):
+        states.append(observation["agent_pos"])
+        before = np.array(env.state().commanded)
+        command = Command(np.stack([before, action[:-1], np.zeros(len(before))]), 1.0 / fps)
+        for step in range(1, round(env.fps / fps) + 1):
+            sent = np.append(command.velocity(step * env.period), action[-1])
+            observation, _, terminated, truncated, info = env.step(sent)
+            onsets, contacts = onsets + max(info["contacts"] - contacts, 0), info["contacts"]
+            if terminated or truncated:
+                see(frame)
+                return states, onsets, bool(info["is_success"])
+        see(frame)
+    return states, onsets, bool(info["is_success"])

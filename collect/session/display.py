@@ -20,8 +20,7 @@ _PERIOD = 0.2  # between two transfers to the viewer [s]
 _PATIENCE = 10.0  # with rerun's own writing [s]
 
 
-_ROBOT = (235, 190, 40)
-_SCENE = (150, 160, 170)
+_ROBOT, _SCENE = (235, 190, 40), (150, 160, 170)
 
 
 class Drawing:
@@ -37,37 +36,34 @@ class Drawing:
 
     def begin(self, env: HandrailEnv) -> None:
         """Draw the scene of a new episode."""
-        self._model = env.model
-        self._channels = Channels.of(env.model.description)
-        self._world, self._time = env.world, 0.0
+        rr, self._env, self._time = self._rr, env, 0.0
         self._episode += 1
-        rr = self._rr
         rr.set_time("episode", sequence=self._episode)
         rr.set_time("time", duration=0.0)
         rr.log("world", rr.Clear(recursive=True))
         rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        self._movers = env.start.scene.movers
         for obstacle in env.start.scene.obstacles():
             self._log_shape(f"world/scene/{obstacle.name}", obstacle)
 
     def see(self, frame: Frame) -> None:
         """Log one moment."""
-        rr = self._rr
-        time, self._time = self._time, self._world.time
+        rr, model, diagnostics = self._rr, self._env.model, frame.diagnostics
+        time, self._time = self._time, self._env.world.time
         rr.set_time("time", duration=time)
-        for mover in self._movers:
+        for mover in self._env.start.scene.movers:
             self._log_shape(f"world/scene/{mover.name}", mover.obstacle(time))
-        q = frame.state[: self._model.size].astype(float)
-        v = frame.state[self._model.size : 2 * self._model.size].astype(float)
+        q, v = frame.state[: 2 * model.size].astype(float).reshape(2, -1)
         self._log_robot(q)
-        self._log_tracking(frame, q, v)
         for name, image in frame.images.items():
             rr.log(f"camera/{name}", rr.Image(image))
-        diagnostics = frame.diagnostics
-        rr.log("distance/smallest", rr.Scalars(_finite(diagnostics.smallest_distance)))
-        rr.log("distance/work", rr.Scalars(_finite(diagnostics.work_distance)))
-        rr.log("controller/solve_time_ms", rr.Scalars(1e3 * diagnostics.solve_time))
-        rr.log("controller/slack", rr.Scalars(diagnostics.slack))
+        numbers = self._motion(frame, q, v) | {
+            "distance/smallest": _finite(diagnostics.smallest_distance),
+            "distance/work": _finite(diagnostics.work_distance),
+            "controller/solve_time_ms": 1e3 * diagnostics.solve_time,
+            "controller/slack": diagnostics.slack,
+        }
+        for path, number in numbers.items():
+            rr.log(path, rr.Scalars(number))
         rr.log("controller/status", rr.TextLog(f"{frame.intent.mode}: {diagnostics.status.value}"))
 
     def end(self, outcome: Outcome) -> None:
@@ -77,36 +73,39 @@ class Drawing:
 
     def _log_robot(self, q: np.ndarray) -> None:
         """Draw the robot's collision shapes where they are."""
-        for placed in self._model.description.collision:
-            pose = self._model.pose(q, placed.frame)
+        model = self._env.model
+        for placed in model.description.collision:
+            pose = model.pose(q, placed.frame)
             position = pose.position + pose.rotation @ placed.placement.translation
             rotation = pose.rotation @ placed.placement.rotation
             shape = Obstacle(placed.name, placed.shape, position, rotation)
             self._log_shape(f"world/robot/{placed.name}", shape, _ROBOT)
 
-    def _log_tracking(self, frame: Frame, q: np.ndarray, v: np.ndarray) -> None:
-        """Plot what is asked on each owned channel against what happens."""
-        rr, channels = self._rr, self._channels
-        realised = channel_matrix(self._model, channels, q) @ v
-        for name, asked, owned, real in zip(
-            channels.names, frame.intent.values, frame.intent.mask, realised, strict=True
-        ):
-            rr.log(f"motion/{name}/realised", rr.Scalars(real))
+    def _motion(self, frame: Frame, q: np.ndarray, v: np.ndarray) -> dict[str, float]:
+        """Return what happens on each channel, and what is asked on those that are owned."""
+        model, intent, numbers = self._env.model, frame.intent, dict[str, float]()
+        channels = Channels.of(model.description)
+        found = zip(intent.values, intent.mask, channel_matrix(model, channels, q) @ v, strict=True)
+        for name, (asked, owned, real) in zip(channels.names, found, strict=True):
+            numbers[f"motion/{name}/realised"] = real
             if owned and np.isfinite(asked):
-                rr.log(f"motion/{name}/asked", rr.Scalars(asked))
+                numbers[f"motion/{name}/asked"] = asked
+        return numbers
 
     def _log_shape(self, path: str, thing: Obstacle, colour: tuple[int, int, int] = _SCENE) -> None:
         rr, size = self._rr, thing.shape.size
-        self._rr.log(path, rr.Transform3D(translation=thing.position, mat3x3=thing.rotation))
-        shapes = {
-            "box": lambda: rr.Boxes3D(half_sizes=[size / 2], colors=[colour]),
-            "capsule": lambda: rr.Capsules3D(
-                radii=[size[0]], lengths=[size[-1]], translations=[[0, 0, -size[-1] / 2]], colors=[colour]
-            ),
-            "cylinder": lambda: rr.Cylinders3D(radii=[size[0]], lengths=[size[-1]], colors=[colour]),
-            "sphere": lambda: rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=[colour]),
-        }
-        rr.log(path, shapes[thing.shape.kind]())
+        round_about = {"radii": [size[0]], "lengths": [size[-1]], "colors": [colour]}
+        rr.log(path, rr.Transform3D(translation=thing.position, mat3x3=thing.rotation))
+        match thing.shape.kind:
+            case "box":
+                shape = rr.Boxes3D(half_sizes=[size / 2], colors=[colour])
+            case "capsule":
+                shape = rr.Capsules3D(translations=[[0, 0, -size[-1] / 2]], **round_about)
+            case "cylinder":
+                shape = rr.Cylinders3D(**round_about)
+            case _:
+                shape = rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=[colour])
+        rr.log(path, shape)
 
 
 def _finite(value: float) -> float:
@@ -141,23 +140,6 @@ class Display:
         if spawn or web:
             self._open_viewer(web)
 
-    def _open_viewer(self, web: bool) -> None:
-        """Open a viewer on a stream in memory, beside the file if there is one."""
-        rr = self._rr
-        self._stream = rr.binary_stream()
-        if self._save:
-            rr.set_sinks(rr.FileSink(self._save), self._stream)
-        rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        try:
-            self._viewer = Viewer(self._read(), web)
-        except (HandrailError, OSError) as error:
-            flag, instead = "--display_data", "--display_web (in a browser) or --display_save FILE.rrd"
-            if web:
-                flag, instead = "--display_web", "--display_save FILE.rrd"
-            raise HandrailError(f"{flag}: {error}; say {instead} instead") from error
-        if web:
-            self._say(f"Watch while it records: {self._viewer.address}")
-
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Draw the scene of a new episode."""
         self._attempt(lambda: self._drawing.begin(env))
@@ -183,6 +165,23 @@ class Display:
             recording.flush(timeout_sec=_PATIENCE)
             recording.disconnect()
 
+    def _open_viewer(self, web: bool) -> None:
+        """Open a viewer on a stream in memory, beside the file if there is one."""
+        rr = self._rr
+        self._stream = rr.binary_stream()
+        if self._save:
+            rr.set_sinks(rr.FileSink(self._save), self._stream)
+        rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        flag, others = "--display_data", "--display_web (in a browser) or "
+        if web:
+            flag, others = "--display_web", ""
+        try:
+            self._viewer = Viewer(self._read(), web)
+        except (HandrailError, OSError) as error:
+            raise HandrailError(f"{flag}: {error}; say {others}--display_save FILE.rrd instead") from error
+        if web:
+            self._say(f"Watch while it records: {self._viewer.address}")
+
     def _attempt(self, step: Callable[[], None]) -> None:
         """Do what must not cost the recording whatever goes wrong; say once that it did, and do no more."""
         if self._off:
@@ -196,7 +195,7 @@ class Display:
     def _pass_on(self) -> None:
         """Let the viewer have what is new; go on without it if it fails and there is a file."""
         self._sent = time.monotonic()
-        data = self._read() if self._stream else b""
+        data = self._read() if self._stream else b""  # also where nobody takes it: else it piles up
         if not self._viewer:
             return
         try:

@@ -5,18 +5,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
-import numpy as np
-
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, shown
-from handrail.controllers.interface.command import Command
-from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.typed import decoded
 
 COLUMN = "settings"
@@ -65,29 +59,3 @@ def _older(row: Mapping[str, Any]) -> dict[str, Any]:
     if not row.get("environment"):
         raise HandrailError(f"{_WHERE}: found none; handrail-record writes them")
     return {ours: row[theirs] for theirs, ours in _OLDER.items() if row.get(theirs) not in (None, "")}
-
-
-class RecordedCommands:
-    """Says what was said in an episode, frame by frame, whatever is asked; a controller.
-
-    Args:
-        actions: velocities at the ends of the periods, and gripper, (T, n + 1).
-        period: of a frame [s].
-    """
-
-    def __init__(self, actions: np.ndarray, period: float) -> None:
-        self._actions, self._period = actions, period
-
-    def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
-        """Begin with the first frame."""
-        self._frame = 0
-
-    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take no note of the scene."""
-
-    def update(self, state: State, intent: Intent) -> Command:
-        """Return the way to the next frame's velocities."""
-        action, before = self._actions[self._frame].astype(np.float64), np.array(state.commanded)
-        self._frame += 1
-        velocities = np.stack([before, action[:-1], np.zeros(len(before))])
-        return Command(velocities, self._period, gripper=float(action[-1]))

@@ -39,16 +39,16 @@ class Viewer:
     """
 
     def __init__(self, first: bytes, web: bool) -> None:
-        self._web, self._waiting = web, bytearray()
-        data_port, page_port = _free_port(_DATA_PORT), _free_port(_PAGE_PORT)
-        data = f"rerun+http://{_HERE}:{data_port}/proxy"
-        self.address = f"http://{_HERE}:{page_port}/?url={quote(data, safe='')}" if web else ""
-        served = ["--serve-web", "--web-viewer-port", str(page_port)] if web else []
+        self._web, self._waiting = web, bytearray(first)
+        self._port, page = _free_port(_DATA_PORT), _free_port(_PAGE_PORT)
+        data = quote(f"rerun+http://{_HERE}:{self._port}/proxy", safe="")
+        self.address = f"http://{_HERE}:{page}/?url={data}" if web else ""
+        served = ["--serve-web", "--web-viewer-port", str(page)] if web else []
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
         end, self._pipe = os.pipe()
         os.set_blocking(self._pipe, False)
         self.process = subprocess.Popen(
-            [_program(), "--bind", _HERE, "--port", str(data_port), *served, "-"],
+            [_program(), "--bind", _HERE, "--port", str(self._port), *served, "-"],
             stdin=end,
             stdout=self._said,
             stderr=subprocess.STDOUT,
@@ -56,7 +56,7 @@ class Viewer:
         )
         os.close(end)
         try:
-            self._begin(first, data_port)
+            self._begin()
         except BaseException:
             self._kill()
             self.close()
@@ -91,18 +91,19 @@ class Viewer:
         os.close(self._pipe)
         self._said.close()
 
-    def _begin(self, first: bytes, port: int) -> None:
+    def _begin(self) -> None:
         """Wait until the viewer listens."""
-        until = time.monotonic() + _BEGIN
-        while not _listens(port):
+        until, trouble = time.monotonic() + _BEGIN, ""
+        while not trouble and not _listens(self._port):
             if self.process.poll() is not None:
-                raise HandrailError(f"the rerun viewer did not start: {self._last_words()}")
-            if time.monotonic() > until:
-                raise HandrailError(f"the rerun viewer did not start within {_BEGIN:.0f} s")
-            with contextlib.suppress(HandrailError):  # it has ended: why is said above
-                self.send(first)
-            first = b""
+                trouble = f": {self._last_words()}"
+            elif time.monotonic() > until:
+                trouble = f" within {_BEGIN:.0f} s"
+            with contextlib.suppress(HandrailError):  # it has ended: why is said next time
+                self.send(b"")
             time.sleep(0.05)
+        if trouble:
+            raise HandrailError(f"the rerun viewer did not start{trouble}")
 
     def _last_words(self) -> str:
         self._said.seek(0)
@@ -126,18 +127,12 @@ def _program() -> str:
 def _free_port(wanted: int) -> int:
     """Return a port that nobody listens on: the one wanted, if it can be."""
     for port in (wanted, 0):
-        with socket.socket() as trial:
-            try:
-                trial.bind((_HERE, port))
-            except OSError:
-                continue
+        with contextlib.suppress(OSError), socket.create_server((_HERE, port)) as trial:
             return trial.getsockname()[1]
     raise HandrailError(f"the rerun viewer did not start: no free port on {_HERE}")
 
 
 def _listens(port: int) -> bool:
-    try:
-        socket.create_connection((_HERE, port), timeout=1.0).close()
-    except OSError:
-        return False
-    return True
+    with contextlib.suppress(OSError), socket.create_connection((_HERE, port), timeout=1.0):
+        return True
+    return False

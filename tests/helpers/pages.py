@@ -9,13 +9,13 @@ from places import ROOT
 from handrail.scripts.bench.__main__ import BENCHES
 from handrail.scripts.commands import COMMANDS
 
-JOBS = {f"handrail-{name}": command.job for name, command in COMMANDS.items() if command.job} | {
-    f"handrail-{name} {verb}": job
+VERBS = {
+    f"handrail-{name} {verb}".strip(): each
     for name, command in COMMANDS.items()
-    for verb, job in command.verbs.items()
+    for verb, each in command.verbs.items()
 }
 BENCH_CONFIGS = {f"bench {name}": bench.settings for name, bench in BENCHES.items()}
-COMMAND_CONFIGS = {name: job.config for name, job in JOBS.items()}
+COMMAND_CONFIGS = {name: verb.config for name, verb in VERBS.items()}
 CONFIGS = COMMAND_CONFIGS | BENCH_CONFIGS
 
 PAGES = ("README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").glob("*.md")))

@@ -100,7 +100,7 @@ def test_what_imports_a_command_keeps_its_own_signals():
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("name", [name for name, command in COMMANDS.items() if command.job])
+@pytest.mark.parametrize("name", [name for name, command in COMMANDS.items() if "" in command.verbs])
 def test_a_command_that_loads_is_ended_by_one_line(name, number):
     """At some moment of the first 0.05 s, long before it has imported what it needs."""
     process = begun(*OURS, name, "--help")

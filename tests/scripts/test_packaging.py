@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-from pages import JOBS
+from pages import VERBS
 from places import FLOORS, ROOT, sources
 
 from handrail.controllers.registry import resolved
@@ -62,7 +62,7 @@ def test_datasets_stays_hugging_face_s(path):
 def test_the_entry_points_are_those_of_the_table():
     names = ("handrail", *(f"handrail-{name}" for name in COMMANDS))
     assert PROJECT["project"]["scripts"] == dict.fromkeys(names, ENTRY)
-    for name in (ENTRY, *(f"handrail.{job.body}" for job in JOBS.values())):
+    for name in (ENTRY, *(f"handrail.{verb.body}" for verb in VERBS.values())):
         assert callable(resolved(name))
 
 
