@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,11 @@ class LeaderJoint:
     offset: Number = 0.0
     """[rad]."""
 
+    def __post_init__(self) -> None:
+        """Check that it drives."""
+        if self.scale == 0.0:
+            raise HandrailError("scale: expected a finite number, not 0")
+
 
 @dataclass(frozen=True)
 class LeaderGripper:
@@ -39,6 +44,11 @@ class LeaderGripper:
     closed: Number
     """Where it is closed, in the leader's units."""
     opened: Number
+
+    def __post_init__(self) -> None:
+        """Check that it moves."""
+        if self.closed == self.opened:
+            raise HandrailError("expected closed and opened to differ")
 
     def grips(self, reading: Mapping[str, float], before: bool) -> bool:
         """Return whether it is closed; in between, what it was before."""
@@ -63,7 +73,7 @@ class LeaderCalibration:
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """What a reading has to have."""
+        """Names of the positions that a reading has to have."""
         handle = (self.gripper.source,) if self.gripper else ()
         return (*(joint.source for joint in self.joints.values()), *handle)
 
@@ -73,26 +83,12 @@ _SO_LEADERS = ("so100_leader", "so101_leader")
 _IN_DEGREES = ("", "use_degrees=true", "use_degrees=True")
 
 
-@dataclass(frozen=True)
-class _CalibrationFile:
-    joints: Mapping[str, Any]
-    gripper: Mapping[str, Any] | None = None
-
-
-def same_arm(leader: str, options: str, arm: tuple[str, ...]) -> LeaderCalibration | None:
-    """Return the calibration of a leader that is a twin of the arm, as LeRobot's SO-100 and SO-101 are.
+def same_arm(leader: LeaderConfig, arm: tuple[str, ...]) -> LeaderCalibration | None:
+    """Return the calibration of a leader that is the arm's twin, as LeRobot's SO-100 and SO-101; else None.
 
     Joint by joint the same names and degrees; both are zero in the middle of their range.
-
-    Args:
-        leader: its type.
-        options: other settings of it.
-        arm: names of the arm's joints.
-
-    Returns:
-        None for any other pair.
     """
-    if leader not in _SO_LEADERS or options not in _IN_DEGREES or arm != _SO_ARM:
+    if leader.type not in _SO_LEADERS or leader.options not in _IN_DEGREES or arm != _SO_ARM:
         return None
     joints = {name: LeaderJoint(f"{name}.pos", math.pi / 180.0) for name in arm}
     return LeaderCalibration(joints, LeaderGripper("gripper.pos", closed=0.0, opened=100.0))
@@ -113,18 +109,9 @@ def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCal
         content: Any = json.loads(path.read_text())
     except (OSError, ValueError, RecursionError) as error:
         raise HandrailError(f"{where}: expected JSON; make it anew: {advice}") from error
-    table = decoded(content, _CalibrationFile, where)
-    check_names(table.joints, dict.fromkeys(arm), f"{where}: joints")
-    joints = {name: decoded(joint, LeaderJoint, f"{where}: {name}") for name, joint in table.joints.items()}
-    for name, joint in joints.items():
-        if joint.scale == 0.0:
-            raise HandrailError(f"{where}: {name}: scale: expected a finite number, not 0")
-    gripper = None
-    if table.gripper is not None:
-        gripper = decoded(table.gripper, LeaderGripper, f"{where}: gripper")
-        if gripper.closed == gripper.opened:
-            raise HandrailError(f"{where}: gripper: expected closed and opened to differ")
-    return LeaderCalibration(joints, gripper)
+    calibration = decoded(content, LeaderCalibration, where)
+    check_names(calibration.joints, dict.fromkeys(arm), f"{where}: joints")
+    return calibration
 
 
 def save_calibration(calibration: LeaderCalibration, path: Path) -> None:
@@ -134,26 +121,16 @@ def save_calibration(calibration: LeaderCalibration, path: Path) -> None:
         write_whole(path, (json.dumps(asdict(calibration), indent=2) + "\n").encode())
 
 
-def calibration_file(teleop: LeaderConfig, robot: str) -> Path:
-    """Return where the calibration is: beside LeRobot's own one of that device.
-
-    Args:
-        teleop: which leader.
-        robot: name of the robot.
-    """
+def calibration_file(leader: LeaderConfig, robot: str) -> Path:
+    """Return where the calibration for a robot is: beside LeRobot's own one of that leader."""
     from lerobot.utils.constants import HF_LEROBOT_CALIBRATION, TELEOPERATORS
 
-    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in teleop.id or "leader")
-    return HF_LEROBOT_CALIBRATION / TELEOPERATORS / teleop.type / f"{name}.{robot}.handrail.json"
+    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in leader.id or "leader")
+    return HF_LEROBOT_CALIBRATION / TELEOPERATORS / leader.type / f"{name}.{robot}.handrail.json"
 
 
-def how_to_calibrate(teleop: LeaderConfig, robot: str) -> str:
+def how_to_calibrate(leader: LeaderConfig, robot: str) -> str:
     """Return the command that calibrates a leader for a robot."""
-    given = (
-        ("--teleop.type", teleop.type),
-        ("--teleop.port", teleop.port),
-        ("--teleop.id", teleop.id),
-        ("--teleop.options", teleop.options),
-        ("--robot", robot),
-    )
-    return " ".join(["handrail-devices calibrate", *(f"{flag}={value}" for flag, value in given if value)])
+    given = {f"--teleop.{each.name}": getattr(leader, each.name) for each in fields(LeaderConfig)}
+    flags = (f"{flag}={value}" for flag, value in (*given.items(), ("--robot", robot)) if value)
+    return " ".join(["handrail-devices calibrate", *flags])

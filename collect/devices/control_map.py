@@ -8,12 +8,13 @@ need the same controls are banks: the action `focus` goes from one to the next.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from handrail.collect.devices.device import DeviceInput
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.channels import BASE, TOOL
 from handrail.controllers.strict_toml import read_toml
+from handrail.controllers.typed import check, check_names
 
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     "hand": TOOL,
@@ -47,7 +48,6 @@ ACTIONS: Mapping[str, str] = {
     "help": "show or hide this help",
 }
 HELD = ("hold", "clutch")  # actions that last as long as the control is down
-NOTHING = ""  # what a control of no meaning is mapped to
 _FOLDER = Path(__file__).parent / "maps"
 
 Moves = Mapping[str, tuple[str, int]]  # axis and sign of each control
@@ -99,9 +99,8 @@ class ControlMap:
             arm: channels of the arm's joints that are steered; the section's are counted from the first.
         """
         of = self.moves.get
-        both = hand and base and bool(of("both"))
-        parts = [of("both", {})] if both else [of("hand", {})] if hand else []
-        parts += [of("turn", {})] if hand else []
+        both = "both" if base and of("both") else "hand"
+        parts = [of(both, {}), of("turn", {})] if hand else []
         parts += self._of_joints(arm)
         parts += [of("base", {})] if base else []
         banks: list[dict[str, tuple[str, int]]] = []
@@ -118,14 +117,10 @@ class ControlMap:
         section = self.moves.get("joints", {})
         at_once = len({axis for axis, _ in section.values()})
         chunks = [arm[first : first + at_once] for first in range(0, len(arm), at_once)] if at_once else []
-        number = {f"joint.{index + 1}": index for index in range(at_once)}
+        named = [dict(zip(SECTIONS["joints"], chunk, strict=False)) for chunk in chunks]
         return [
-            {
-                control: (chunk[number[axis]], sign)
-                for control, (axis, sign) in section.items()
-                if number[axis] < len(chunk)
-            }
-            for chunk in chunks
+            {control: (names[axis], sign) for control, (axis, sign) in section.items() if axis in names}
+            for names in named
         ]
 
 
@@ -141,41 +136,31 @@ def load_map(device: str, controls: Iterable[str], changes: str = "") -> Control
     if changes:
         path = Path(changes).expanduser()
         changed = read_toml(path, "--teleop.map")
-        _check(changed, frozenset(controls), str(path))
+        _check(changed, dict.fromkeys(sorted(controls)), f"--teleop.map {path}")
         table = {name: table.get(name, {}) | changed.get(name, {}) for name in {**table, **changed}}
+    actions = {control: action for control, action in table.pop("actions").items() if action}
     moves = {
         name: {control: _axis(value) for control, value in section.items() if value}
         for name, section in table.items()
-        if name != "actions"
     }
-    return ControlMap(moves, {control: action for control, action in table["actions"].items() if action})
+    return ControlMap(moves, actions)
 
 
 def _axis(value: str) -> tuple[str, int]:
     return value.removeprefix("-"), -1 if value.startswith("-") else 1
 
 
-def _check(table: dict[str, Any], controls: frozenset[str], where: str) -> None:
-    """Check a person's table."""
+def _check(table: dict[str, Any], controls: Mapping[str, Any], where: str) -> None:
+    """Check a person's table; an empty text takes a meaning away."""
+    meanings = {name: (*axes, *(f"-{axis}" for axis in axes)) for name, axes in SECTIONS.items()}
+    meanings["actions"] = tuple(ACTIONS)
     for name, section in table.items():
-        if name not in (*SECTIONS, "actions") or not isinstance(section, dict):
-            raise HandrailError(
-                f"--teleop.map {where}: section {shown(name)}: "
-                f"expected some of [{'], ['.join((*SECTIONS, 'actions'))}]"
-            )
-        choices = ACTIONS if name == "actions" else SECTIONS[name]
+        if name not in meanings or not isinstance(section, dict):
+            expected = "], [".join(meanings)
+            raise HandrailError(f"{where}: section {shown(name)}: expected some of [{expected}]")
+        check_names(section, controls, f"{where}: [{name}]")
         for control, value in section.items():
-            if control not in controls:
-                raise HandrailError(
-                    f"--teleop.map {where}: [{name}]: unknown control {shown(control)}: "
-                    f"expected one of {', '.join(sorted(controls))}"
-                )
-            if value != NOTHING and (not isinstance(value, str) or value.removeprefix("-") not in choices):
-                sign = "" if name == "actions" else '"-" before it turns it around, '
-                raise HandrailError(
-                    f"--teleop.map {where}: [{name}] {control}: expected one of {', '.join(choices)} "
-                    f'({sign}"" takes it away), got {shown(value)}'
-                )
+            check(value, Literal[*meanings[name], ""], f"{where}: [{name}] {control}")
 
 
 _AXES = {
@@ -196,7 +181,7 @@ _CONTROLS = {
     "right_y": "right stick ↕",
     "left_stick": "press left stick",
     "right_stick": "press right stick",
-    **{name: f"{sign}" for name, sign in (("left", "←"), ("right", "→"), ("up", "↑"), ("down", "↓"))},
+    **{"left": "←", "right": "→", "up": "↑", "down": "↓"},
 }
 
 
@@ -210,7 +195,8 @@ def moves_help(moves: Moves) -> list[tuple[str, str]]:
     lines = []
     for axis in dict.fromkeys(axis for axis, _ in moves.values()):
         of_axis = [(control, sign) for control, (name, sign) in moves.items() if name == axis]
-        forward, backward = _AXES.get(axis, (f"{_joint(axis)} +", "−"))
+        joint = axis.removeprefix("joint.").removesuffix("_joint").replace("_", " ")
+        forward, backward = _AXES.get(axis, (f"{joint} +", "−"))
         ordered = sorted(of_axis, key=lambda each: -each[1])
         lines.append((" / ".join(control_name(name) for name, _ in ordered), f"{forward} / {backward}"))
     return lines
@@ -226,12 +212,5 @@ def actions_help(controls: ControlMap) -> list[tuple[str, str]]:
 
 def control_of(controls: Sequence[ControlMap], *actions: str) -> str:
     """Return the control that asks for one of some actions; nothing where none does."""
-    for table in controls:
-        for control, action in table.actions.items():
-            if action in actions:
-                return control_name(control)
-    return ""
-
-
-def _joint(axis: str) -> str:
-    return axis.removeprefix("joint.").removesuffix("_joint").replace("_", " ")
+    of_all = (each for table in controls for each in table.actions.items())
+    return next((control_name(control) for control, action in of_all if action in actions), "")

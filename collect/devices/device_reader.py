@@ -53,9 +53,10 @@ class DeviceReader:
         """Return the moves in force: those of the bank that was chosen."""
         return banks[self._bank % len(banks)]
 
-    def next_bank(self, banks: Sequence[Moves]) -> None:
-        """Go on to the next bank."""
-        self._bank = (self._bank + 1) % len(banks)
+    def next_bank(self, banks: Sequence[Moves]) -> bool:
+        """Go on to the next bank; return whether that is the first one again."""
+        self._bank = (self._bank % len(banks) + 1) % len(banks)
+        return self._bank == 0
 
     def input(self, banks: Sequence[Moves]) -> DeviceInput | None:
         """Return what the device says now in the words of its map; None while it is gone."""

@@ -42,12 +42,7 @@ class Gamepad:
         self._down: frozenset[str] = frozenset()
 
     def open(self) -> None:
-        """Find a gamepad.
-
-        Raises:
-            DeviceGoneError: there is none, or it may not be read.
-            HandrailError: pygame is not installed.
-        """
+        """Find a gamepad."""
         pygame, controllers = _sdl()
         pygame.display.init()
         controllers.init()
@@ -59,11 +54,7 @@ class Gamepad:
         self._pygame, self._pad, self._down = pygame, controllers.Controller(known), frozenset()
 
     def read(self) -> DeviceInput:
-        """Return its sticks and buttons.
-
-        Raises:
-            DeviceGoneError: it was unplugged.
-        """
+        """Return its sticks and buttons."""
         time.sleep(_PERIOD)
         self._pygame.event.pump()
         self._pygame.event.clear()

@@ -23,15 +23,12 @@ NAMES = frozenset({*_NAMED.values(), *_ARROWS.values(), *(chr(code).lower() for 
 
 @dataclass(frozen=True)
 class Key:
-    """What happened to a key, or one of `SIGNALS`.
-
-    Attributes:
-        name: the character, or a name such as `enter`.
-        change: a terminal that does not tell releases says `down` again and again while a key is held.
-    """
+    """What happened to a key, or one of `SIGNALS`."""
 
     name: str
+    """The character, or a name such as `enter`."""
     change: Change = "down"
+    """A terminal that does not tell releases says `down` again and again while a key is held."""
 
 
 class KeyBytes:
@@ -47,67 +44,39 @@ class KeyBytes:
 
     def take(self, data: bytes, now: float) -> list[Key]:
         """Return the keys in what came now [s]; what is not whole yet waits for more."""
-        if data:
-            self._since = now
+        self._since = now if data else self._since
         self._rest += data
         keys: list[Key] = []
         typed: list[Key] = []
         while self._rest:
-            found = self._next(now, typed, keys)
-            if not found:
+            size, key = self._first(waits=now - self._since < _ALONE)
+            if not size:
                 break
-            self._rest = self._rest[found:]
+            if key is None:
+                self.dropped += 1
+            else:
+                keys.append(key)
+                typed += [key] if self._rest[0] != _ESCAPE else []
+            self._rest = self._rest[size:]
         if len(typed) > _MOST:
             self.dropped += len(typed)
             return [key for key in keys if key not in typed]
         return keys
 
-    def _next(self, now: float, typed: list[Key], keys: list[Key]) -> int:
-        """Take what comes first; return how many bytes it has, 0 if the rest of it is not there yet."""
-        if self._rest[0] != _ESCAPE:
-            return self._character(typed, keys)
-        if found := _CSI.match(self._rest):
-            key = _of_sequence(found[1].decode(), found[2])
-        elif found := _SS3.match(self._rest):
-            key = Key(_ARROWS[found[1]]) if found[1] in _ARROWS else None
-        else:
-            return self._unfinished(now, keys)
-        if key is None:
-            self.dropped += 1
-        else:
-            keys.append(key)
-        return found.end()
-
-    def _unfinished(self, now: float, keys: list[Key]) -> int:
-        """Take an Escape that no known sequence follows."""
+    def _first(self, waits: bool) -> tuple[int, Key | None]:
+        """Return how many bytes the first key has, 0 while it waits for more, and the key, None of no key."""
         rest = self._rest
+        if rest[0] != _ESCAPE:
+            return 1, _of_code(rest[0])
+        if found := _CSI.match(rest):
+            return found.end(), _of_sequence(found[1].decode(), found[2])
+        if found := _SS3.match(rest):
+            return found.end(), Key(_ARROWS[found[1]]) if found[1] in _ARROWS else None
         if rest == b"\x1b":
-            if now - self._since < _ALONE:
-                return 0
-            keys.append(Key("escape"))
-            return 1
+            return (0, None) if waits else (1, Key("escape"))
         if rest[1:2] in (b"[", b"O"):
-            if len(rest) < _LONGEST and now - self._since < _ALONE:
-                return 0
-            self.dropped += 1
-            return len(rest)
-        if rest[1] == _ESCAPE:
-            keys.append(Key("escape"))
-            return 1
-        self.dropped += 1  # a key with Alt
-        return 2
-
-    def _character(self, typed: list[Key], keys: list[Key]) -> int:
-        first = self._rest[0]
-        if first in _NAMED:
-            keys.append(Key(_NAMED[first]))
-            typed.append(keys[-1])
-        elif 0x20 < first < 0x7F:
-            keys.append(Key(chr(first).lower()))
-            typed.append(keys[-1])
-        else:
-            self.dropped += 1  # another control character, or not of this alphabet
-        return 1
+            return (0, None) if waits and len(rest) < _LONGEST else (len(rest), None)
+        return (1, Key("escape")) if rest[1] == _ESCAPE else (2, None)  # the last is a key with Alt
 
 
 def _of_sequence(parameters: str, final: bytes) -> Key | None:
@@ -120,20 +89,18 @@ def _of_sequence(parameters: str, final: bytes) -> Key | None:
         return Key(THERE)
     code, _, rest = parameters.partition(";")
     modifiers, _, change = rest.partition(";")[0].partition(":")
-    how = _CHANGES.get(change or "1")
-    held = int(modifiers) - 1 if modifiers.isdigit() else 0
+    how, number = _CHANGES.get(change or "1"), code.partition(":")[0]
     if how is None:
         return None
     if final in _ARROWS:
         return Key(_ARROWS[final], how)
-    number = code.partition(":")[0]
     if final != b"u" or not number.isdigit():
         return None
-    return _of_code(int(number), held, how)
+    return _of_code(int(number), int(modifiers) - 1 if modifiers.isdigit() else 0, how)
 
 
-def _of_code(code: int, modifiers: int, change: Change) -> Key | None:
-    """Return a key by its number in kitty's protocol."""
+def _of_code(code: int, modifiers: int = 0, change: Change = "down") -> Key | None:
+    """Return a key by its character, or its number in kitty's protocol."""
     if modifiers & _CONTROL and change != "up":
         return Key(INTERRUPT) if code == ord("c") else None
     if code in _NAMED:

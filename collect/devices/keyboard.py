@@ -50,11 +50,7 @@ class KeyTerminal:
         self._tells_releases = False
 
     def open(self) -> None:
-        """Take it.
-
-        Raises:
-            DeviceGoneError: there is none, or it belongs to another program now.
-        """
+        """Take it."""
         try:
             import termios
             import tty
@@ -87,11 +83,7 @@ class KeyTerminal:
         self.write(_KEYS_BEGIN)
 
     def read(self, patience: float) -> bytes:
-        """Return what came, after some time at most [s].
-
-        Raises:
-            DeviceGoneError: it was closed.
-        """
+        """Return what came, after some time at most [s]."""
         try:
             ready, _, _ = select.select([self._file], [], [], patience)
             data = os.read(self._file, _AT_ONCE) if ready else None
@@ -145,20 +137,12 @@ class Keyboard:
         self._begin()
 
     def open(self) -> None:
-        """Take the terminal.
-
-        Raises:
-            DeviceGoneError: there is none, or it belongs to another program now.
-        """
+        """Take the terminal."""
         self._begin()
         self._terminal.open()
 
     def read(self) -> DeviceInput:
-        """Return the keys that are held.
-
-        Raises:
-            DeviceGoneError: the terminal was closed.
-        """
+        """Return the keys that are held."""
         data = self._terminal.read(_WAIT)
         now = self._clock()
         if data:

@@ -50,20 +50,12 @@ class LeaderArm:
         self.dropped = 0
 
     def open(self) -> None:
-        """Connect it.
-
-        Raises:
-            DeviceGoneError: it does not answer, may not be opened, or is not calibrated.
-        """
+        """Connect it."""
         self._teleoperator = connected(self._make(), self.name)
         self._last = DeviceInput(self._clock(), attended=False)
 
     def read(self) -> DeviceInput:
-        """Return its joint positions.
-
-        Raises:
-            DeviceGoneError: it was unplugged, or says nothing that makes sense for a second.
-        """
+        """Return its joint positions."""
         assert self._teleoperator is not None
         time.sleep(_PERIOD)
         trouble = "what it says makes no sense"
@@ -149,34 +141,26 @@ def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
     if config.type not in known:
         raise unknown_name("--teleop.type", config.type, known)
     try:
-        settings = draccus.decode(known[config.type], _settings(config))
-        return make_teleoperator_from_config(settings)
+        return make_teleoperator_from_config(draccus.decode(known[config.type], _settings(config)))
     except Exception as error:  # whatever a driver's code raises
         raise HandrailError(f"--teleop.type {config.type}: {message_of(error)}") from error
 
 
 def leader_types() -> Mapping[str, Any]:
     """Return the settings of every type of LeRobot's teleoperators, by its name."""
-    from lerobot.teleoperators.config import TeleoperatorConfig
+    from lerobot import teleoperators
     from lerobot.utils.import_utils import register_third_party_plugins
 
-    _import_all()
-    register_third_party_plugins()
-    return TeleoperatorConfig.get_known_choices()
-
-
-def _import_all() -> None:
-    """Let LeRobot's own teleoperators register; those whose drivers are not installed cannot."""
-    import lerobot.teleoperators
-
-    for module in pkgutil.iter_modules(lerobot.teleoperators.__path__):
-        with contextlib.suppress(ImportError):
+    for module in pkgutil.iter_modules(teleoperators.__path__):
+        with contextlib.suppress(ImportError):  # of a driver that is not installed
             importlib.import_module(f"lerobot.teleoperators.{module.name}")
+    register_third_party_plugins()
+    return teleoperators.TeleoperatorConfig.get_known_choices()
 
 
 def _settings(config: LeaderConfig) -> dict[str, Any]:
     """Return what LeRobot's settings are made of."""
-    given = {name: value for name in ("port", "id") if (value := getattr(config, name))}
+    given = {name: value for name, value in (("port", config.port), ("id", config.id)) if value}
     for option in filter(None, (part.strip() for part in config.options.split(","))):
         name, equals, value = option.partition("=")
         if not equals or not name.isidentifier():

@@ -22,38 +22,29 @@ _STEP, _LEAST = 0.2, 0.2  # of the speed
 
 def choice_of(action: str, person: Person) -> Ask | None:
     """Return what an action asks for now; None where it asks nothing of the person."""
-    setting = person.setting
-    if action in ("start", "start_or_pause"):
-        return _started(action, person.phase)
-    if action in ("mode", "mode_back"):
-        names = list(person.modes)
-        at = names.index(setting.mode.name) if setting.mode.name in names else 0
-        return Ask("mode", names[(at + (1 if action == "mode" else -1)) % len(names)])
-    if action in ("faster", "slower", "speed"):
-        return Ask("speed", _speed(action, setting.speed))
-    if action == "frame":
-        at = FRAMES.index(setting.frame) if setting.frame in FRAMES else -1
-        return Ask("frame", FRAMES[(at + 1) % len(FRAMES)])
-    if action == "focus":
-        return Ask("focus", "hand" if setting.focus == "base" else "base")
-    if action == "practice":
-        return Ask("practice", not person.practises)
+    setting, phase, now = person.setting, person.phase, person.setting.speed
+    match action:
+        case "start" | "start_or_pause" if phase is Phase.STOPPED:
+            return Ask("stop", False)  # after the e-stop, first its release
+        case "start_or_pause":
+            return Ask("pause" if phase in (Phase.DRIVING, Phase.LOST) else "start")
+        case "mode" | "mode_back":
+            names = list(person.modes)
+            at = names.index(setting.mode.name) if setting.mode.name in names else 0
+            return Ask("mode", names[(at + (1 if action == "mode" else -1)) % len(names)])
+        case "speed":
+            return Ask("speed", _LEAST if now > 1.0 - _STEP / 2 else round(now + _STEP, 1))
+        case "faster" | "slower":
+            step = _STEP if action == "faster" else -_STEP
+            return Ask("speed", round(min(1.0, max(_LEAST, now + step)), 1))
+        case "frame":
+            at = FRAMES.index(setting.frame) if setting.frame in FRAMES else -1
+            return Ask("frame", FRAMES[(at + 1) % len(FRAMES)])
+        case "focus":
+            return Ask("focus", "hand" if setting.focus == "base" else "base")
+        case "practice":
+            return Ask("practice", not person.practises)
     return Ask(action) if action in ASKS else None
-
-
-def _started(action: str, phase: Phase) -> Ask:
-    """Return what start asks for: after the e-stop, first that it is released."""
-    if phase is Phase.STOPPED:
-        return Ask("stop", False)
-    if action == "start_or_pause" and phase in (Phase.DRIVING, Phase.LOST):
-        return Ask("pause")
-    return Ask("start")
-
-
-def _speed(action: str, now: float) -> float:
-    if action == "speed":
-        return _LEAST if now > 1.0 - _STEP / 2 else round(now + _STEP, 1)
-    return round(min(1.0, max(_LEAST, now + (_STEP if action == "faster" else -_STEP))), 1)
 
 
 class LocalPerson:
@@ -162,14 +153,12 @@ class LocalPerson:
             self._grip = not self._grip
         elif action == "help":
             self._card.turn_over()
-        elif action == "focus" and self._goes_through_banks():
-            return
-        elif (ask := choice_of(action, self._person)) is not None:
-            self._person.ask(ask)
+        elif action == "focus":  # after the last bank comes the other focus, where the mode has one
+            if self._main.next_bank(self._banks(self._main)) and self._person.setting.mode.by_focus:
+                self._ask(action)
+        else:
+            self._ask(action)
 
-    def _goes_through_banks(self) -> bool:
-        """Go to the next bank; the last one leads to the other focus, where the mode has one."""
-        banks = self._banks(self._main)
-        is_last = self._main.bank(banks) is banks[-1]
-        self._main.next_bank(banks)
-        return not (is_last and self._person.setting.mode.by_focus)
+    def _ask(self, action: str) -> None:
+        if (ask := choice_of(action, self._person)) is not None:
+            self._person.ask(ask)

@@ -11,8 +11,8 @@ from handrail.collect.devices.calibration import (
     same_arm,
 )
 from handrail.collect.devices.card import Card
-from handrail.collect.devices.control_map import ControlMap, control_of, load_map
-from handrail.collect.devices.device import Device, StickShape
+from handrail.collect.devices.control_map import control_of, load_map
+from handrail.collect.devices.device import StickShape
 from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.follower import Follower
 from handrail.collect.devices.gamepad import Gamepad
@@ -33,10 +33,12 @@ from handrail.controllers.interface.channels import Channels
 Say = Callable[[str], None]
 
 
-def open_gamepad(
+def open_device(
     config: RecordConfig, env: HandrailEnv, say: Say, modes: Mapping[str, TeleopMode] | None = None
 ) -> LocalPerson:
-    """Return a person with a gamepad; the keys of the terminal, if there is one, ask for things too.
+    """Return a person with the device that the operator is named after.
+
+    The keys of the terminal, if there is one, ask for what the device has no control for.
 
     Args:
         config: of the recording.
@@ -44,50 +46,39 @@ def open_gamepad(
         say: is told what to hold.
         modes: that one can change to; all by default.
     """
-    return _with(config, env, say, _gamepad(config.teleop), modes)
-
-
-def open_spacemouse(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPerson:
-    """Return a person with a SpaceMouse; the keys of the terminal, if there is one, ask for things too."""
-    return _with(config, env, say, _spacemouse(config.teleop))
-
-
-def open_keyboard(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPerson:
-    """Return a person with the keys of this terminal."""
-    return _with(config, env, say, _keyboard(config.teleop))
+    main, beside = _reader(config.operator, config.teleop), None
+    if config.operator != "keyboard" and has_terminal():
+        beside = DeviceReader(Keyboard(), load_map("keyboard", NAMES).only())
+    _open(main, beside)
+    say(f"{config.operator}: hold {control_of([main.controls], 'hold') or 'what moves'} to move")
+    return _person(config, env, modes or build_modes(config, env), main, beside)
 
 
 def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPerson:
     """Return a person with a leader arm in one hand, and keys or a gamepad in the other."""
     teleop, description = config.teleop, env.model.description
     modes = _led(build_modes(config, env), env, config.mode_name)
-    arm = description.arm_joints
-    advice = how_to_calibrate(teleop, config.robot)
-    file, twin = calibration_file(teleop, description.name), same_arm(teleop.type, teleop.options, arm)
-    calibration = twin if twin and not file.is_file() else load_calibration(file, arm, advice)
-    leader = LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources)
-    device, controls = {"keyboard": _keyboard, "gamepad": _gamepad}[teleop.beside](teleop)
-    main, beside = _opened(DeviceReader(leader), DeviceReader(device, controls.only("base")))
-    say(f"{teleop.type}: hold {control_of([controls], 'clutch')} on the {teleop.beside} to move the arm")
+    arm, file = description.arm_joints, calibration_file(teleop, description.name)
+    twin = None if file.is_file() else same_arm(teleop, arm)
+    calibration = twin or load_calibration(file, arm, how_to_calibrate(teleop, config.robot))
+    main = DeviceReader(LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources))
+    beside = _reader(teleop.beside, teleop)
+    beside.controls = beside.controls.only("base")
+    _open(main, beside)
+    clutch = control_of([beside.controls], "clutch")
+    say(f"{teleop.type}: hold {clutch} on the {teleop.beside} to move the arm")
     return _person(config, env, modes, main, beside, Follower(env.model, calibration))
 
 
-def _with(
-    config: RecordConfig,
-    env: HandrailEnv,
-    say: Say,
-    made: tuple[Device, ControlMap],
-    modes: Mapping[str, TeleopMode] | None = None,
-) -> LocalPerson:
-    """Return a person with a device, and the terminal's keys for what the device has no control for."""
-    device, controls = made
-    readers = [DeviceReader(device, controls)]
-    if device.name != "keyboard" and has_terminal():
-        readers.append(DeviceReader(Keyboard(), load_map("keyboard", NAMES).only()))
-    _opened(*readers)
-    say(f"{device.name}: hold {control_of([controls], 'hold') or 'what moves'} to move")
-    modes = modes or build_modes(config, env)
-    return _person(config, env, modes, readers[0], (readers[1:] or [None])[0], None)
+def _reader(name: str, teleop: TeleopConfig) -> DeviceReader:
+    """Return the reader of a device, with the map of the settings."""
+    shape = StickShape(teleop.dead_zone, teleop.exponent)
+    device, controls = {
+        "gamepad": (Gamepad(shape), gamepad.CONTROLS),
+        "spacemouse": (SpaceMouse(shape), spacemouse.CONTROLS),
+        "keyboard": (Keyboard(), NAMES),
+    }[name]
+    return DeviceReader(device, load_map(name, controls, teleop.map))
 
 
 def _person(
@@ -96,39 +87,25 @@ def _person(
     modes: Mapping[str, TeleopMode],
     main: DeviceReader,
     beside: DeviceReader | None,
-    follower: Follower | None,
+    follower: Follower | None = None,
 ) -> LocalPerson:
     person = Person(env.model, modes, config.mode_name)
     person.ask(Ask("frame", "base"))
-    tables = [source.controls for source in (main, beside) if source]
+    tables = [reader.controls for reader in (main, beside) if reader]
     card = Card(main.device.name, tables, len(env.model.description.base.joints))
     return LocalPerson(person, main, beside, follower, card)
 
 
-def _opened(*readers: DeviceReader) -> tuple[DeviceReader, ...]:
-    """Return devices that are open; where one is not, those before are given back."""
+def _open(*readers: DeviceReader | None) -> None:
+    """Open devices; where one cannot be, those before are given back."""
+    there = [reader for reader in readers if reader]
     try:
-        return tuple(reader.start() for reader in readers)
+        for reader in there:
+            reader.start()
     except BaseException:
-        for reader in readers:
+        for reader in there:
             reader.close()
         raise
-
-
-def _shape(teleop: TeleopConfig) -> StickShape:
-    return StickShape(teleop.dead_zone, teleop.exponent)
-
-
-def _gamepad(teleop: TeleopConfig) -> tuple[Device, ControlMap]:
-    return Gamepad(_shape(teleop)), load_map("gamepad", gamepad.CONTROLS, teleop.map)
-
-
-def _spacemouse(teleop: TeleopConfig) -> tuple[Device, ControlMap]:
-    return SpaceMouse(_shape(teleop)), load_map("spacemouse", spacemouse.CONTROLS, teleop.map)
-
-
-def _keyboard(teleop: TeleopConfig) -> tuple[Device, ControlMap]:
-    return Keyboard(), load_map("keyboard", NAMES, teleop.map)
 
 
 def _led(modes: Mapping[str, TeleopMode], env: HandrailEnv, first: str) -> dict[str, TeleopMode]:

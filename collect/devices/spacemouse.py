@@ -46,12 +46,7 @@ class SpaceMouse:
         self._forget()
 
     def open(self) -> None:
-        """Find a SpaceMouse.
-
-        Raises:
-            DeviceGoneError: there is none, or it may not be read.
-            HandrailError: hidapi is not installed.
-        """
+        """Find a SpaceMouse."""
         try:
             import hid
         except ImportError as error:
@@ -71,11 +66,7 @@ class SpaceMouse:
             ) from error
 
     def read(self) -> DeviceInput:
-        """Return its axes and buttons.
-
-        Raises:
-            DeviceGoneError: it was unplugged.
-        """
+        """Return its axes and buttons."""
         presses: list[str] = []
         try:
             report = self._hid.read(64, _WAIT)

@@ -33,7 +33,9 @@ class LeKiwiBody:
     """
 
     def __init__(self, env: HandrailEnv, units: RobotUnits) -> None:
-        self._env, self._units = env, units
+        assert units.base is not None
+        assert units.gripper is not None
+        self._env, self._units, self._base, self._grip = env, units, units.base, units.gripper
         self._painters: dict[str, Painter] = {}
 
     def reset(self, seed: int) -> None:
@@ -50,18 +52,16 @@ class LeKiwiBody:
         Returns:
             Whether it made sense; one that does not changes nothing.
         """
-        base, grip = self._units.base, self._units.gripper
-        assert base is not None
-        assert grip is not None
-        twist = np.array([number(action, name) for name in (base.x, base.y, base.theta)])
+        twist = np.array([number(action, name) for name in self._base.twist])
         now = self._units.action(self._arm, np.zeros(len(self._arm)), self._twist, self._gripper)
-        said = {name: number(action, name) for name in (*self._units.positions, grip.name) if name in action}
+        names = (*self._units.positions, self._grip.name)
+        said = {name: number(action, name) for name in names if name in action}
         if not np.isfinite(twist).all() or not all(map(math.isfinite, said.values())):
             return False
         now |= said
-        self._twist = twist * base.scale
+        self._twist = twist * self._base.scale
         self._arm = self._units.joint_positions(np.array([now[name] for name in self._units.positions]))
-        self._gripper = grip.closing(now[grip.name])
+        self._gripper = self._grip.closing(now[self._grip.name])
         return True
 
     def stop_base(self) -> None:

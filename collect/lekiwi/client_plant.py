@@ -1,7 +1,7 @@
 """A robot behind its LeRobot client, in a world of which nobody tells the truth; a robot and a world."""
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -24,7 +24,6 @@ from handrail.controllers.robot.model import Pose, RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
 
 _MOST_BRAKING = 200  # periods
-
 
 _GAIN = 2.0  # of a joint towards its place [1/s]
 _SPEED = 0.5  # of a joint, at most [rad/s, m/s]
@@ -65,9 +64,13 @@ def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) 
 def open_client(config: RecordConfig) -> tuple[HandrailEnv, Link]:
     """Return the environment of a recording's robot, and the link to it."""
     fps = config.robot_fps or config.dataset.fps
+
+    def plant(model: RobotModel, scene: Scene, q: FloatArray, period: float, **looks: Any) -> ClientPlant:
+        return ClientPlant(model, scene, q, link, env.np_random_seed)
+
     link = connect(config.robot_client, config.client, config.camera_names, load_model(config.robot), fps)
     try:
-        env = build_env(config, config.dataset.fps, plant=plant_of(link, lambda: env.np_random_seed))
+        env = build_env(config, config.dataset.fps, plant=plant)
     except BaseException:
         link.close()
         raise
@@ -164,17 +167,3 @@ class ClientPlant:
     def still(self) -> frozenset[str]:
         """Return nothing: nobody knows."""
         return frozenset()
-
-
-def plant_of(link: Link, seed: Callable[[], int]) -> Callable[..., ClientPlant]:
-    """Return what makes the plant of an episode.
-
-    Args:
-        link: to the robot.
-        seed: says that of the episode.
-    """
-
-    def build(model: RobotModel, scene: Scene, q: FloatArray, period: float, **looks: Any) -> ClientPlant:
-        return ClientPlant(model, scene, q, link, seed())
-
-    return build

@@ -83,8 +83,7 @@ class LeKiwiLoop:
         """
         for message in received:
             self._commands.put(message, now)
-        message = self._commands.newest(now)
-        if message is not None:
+        if (message := self._commands.newest(now)) is not None:
             self._take(message, now, wall)
         if now - self._heard > self._config.watchdog_timeout_ms / 1000.0 and not self._stopped:
             self._stopped = True

@@ -5,9 +5,9 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.client_config import CLIENTS, ClientConfig
 from handrail.collect.lekiwi.host import import_zmq
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
-from handrail.collect.processor.units import RobotUnits, robot_units
+from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interface.controller import State
@@ -27,29 +27,13 @@ _GONE = 2.0  # without a usable observation for so long, the robot is gone [s]
 _log = logging.getLogger(__name__)
 
 
-class Client(Protocol):
-    """What is needed of a LeRobot robot."""
-
-    @property
-    def action_features(self) -> Mapping[str, Any]:
-        """Names of the action's entries."""
-        ...
-
-    def connect(self) -> None:
-        """Connect."""
-        ...
-
-    def get_observation(self) -> dict[str, Any]:
-        """Return what it says."""
-        ...
-
-    def send_action(self, action: dict[str, Any]) -> Any:
-        """Send it an action."""
-        ...
-
-    def disconnect(self) -> None:
-        """Disconnect."""
-        ...
+@contextlib.contextmanager
+def _explained(what: str) -> Iterator[None]:
+    """Turn whatever a driver's code raises into one line that says what failed."""
+    try:
+        yield
+    except Exception as error:
+        raise HandrailError(f"{what}: {message_of(error)}") from error
 
 
 class Link:
@@ -59,7 +43,7 @@ class Link:
     it the full stop, period by period.
 
     Args:
-        client: LeRobot's, not connected.
+        client: a robot of LeRobot's, not connected.
         name: of the robot.
         model: of the robot.
         period: from one command to the next [s].
@@ -77,7 +61,7 @@ class Link:
 
     def __init__(
         self,
-        client: Client,
+        client: Any,
         name: str,
         model: RobotModel,
         period: float,
@@ -87,9 +71,8 @@ class Link:
     ) -> None:
         self._client, self._name, self.model, self.period = client, name, model, period
         self._simulated, self._clock, self._sleep = simulated, clock, sleep
-        units: RobotUnits = robot_units(name, model.description)
-        missing = set(client.action_features) ^ set(units.action_names)
-        if missing:
+        units = robot_units(name, model.description)
+        if set(client.action_features) != set(units.action_names):
             raise HandrailError(
                 f"--robot_client {name}: expected a robot with {', '.join(client.action_features)}; "
                 f"got {model.description.name} (--robot {name}?)"
@@ -99,10 +82,8 @@ class Link:
         self._sent_at, self.late = math.inf, 0
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._episode, self._extras = 0, {}
-        try:
+        with _explained(f"--robot_client {name}: cannot be reached"):
             client.connect()
-        except Exception as error:  # whatever a driver's code raises
-            raise HandrailError(f"--robot_client {name}: cannot be reached: {message_of(error)}") from error
         self._heard = self._deadline = clock()
         try:
             self._catch_up()
@@ -121,11 +102,8 @@ class Link:
 
     def exchange(self, command: ArrayLike) -> NDArray[np.floating]:
         """Send a command, wait for the end of the period, and listen; return what was sent, (n + 1,)."""
-        try:
-            with self._lock:
-                self._send(command)
-        except Exception as error:  # whatever a driver's code raises
-            raise HandrailError(f"robot {self._name}: cannot be reached: {message_of(error)}") from error
+        with _explained(f"robot {self._name}: cannot be reached"), self._lock:
+            self._send(command)
         sent = self.body.sent
         self._wait()
         self._listen()
@@ -142,19 +120,15 @@ class Link:
         """Return what cameras of ours see, (height, width, 3), in a size (height, width)."""
         import cv2
 
-        names = {camera: CLIENTS[self._name][camera] for camera in cameras}
-        for name in names.values():
+        seen: dict[str, Any] = {}
+        for camera in cameras:
+            name = CLIENTS[self._name][camera]
             if name not in self._said:
                 raise HandrailError(f"robot {self._name}: camera {name} says nothing; look at its cable")
-        # LeRobot's client hands on OpenCV's pictures, whose colours are the other way round
-        seen = {
-            camera: cv2.cvtColor(np.asarray(self._said[name]), cv2.COLOR_BGR2RGB)
-            for camera, name in names.items()
-        }
-        return {
-            camera: cv2.resize(picture, size[::-1], interpolation=cv2.INTER_AREA)
-            for camera, picture in seen.items()
-        }  # pyright: ignore[reportReturnType]
+            # LeRobot's client hands on OpenCV's pictures, whose colours are the other way round
+            picture = cv2.cvtColor(np.asarray(self._said[name]), cv2.COLOR_BGR2RGB)
+            seen[camera] = cv2.resize(picture, size[::-1], interpolation=cv2.INTER_AREA)
+        return seen
 
     def close(self) -> None:
         """Let it go; its own watchdog stops what still moves."""
@@ -194,10 +168,8 @@ class Link:
                 return
 
     def _listen(self) -> None:
-        try:
+        with _explained(f"robot {self._name}: cannot be heard"):
             said = self._client.get_observation()
-        except Exception as error:  # whatever a driver's code raises
-            raise HandrailError(f"robot {self._name}: cannot be heard: {message_of(error)}") from error
         now = self._clock()
         with self._lock:
             state, self._said = self.body.observe(said, now), said

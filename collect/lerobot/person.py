@@ -12,7 +12,7 @@ from typing import Any
 from handrail.collect.cockpit.cockpit import Cockpit, check_installed
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.config import RecordConfig, SessionConfig
-from handrail.collect.devices.open_devices import open_gamepad
+from handrail.collect.devices.open_devices import open_device
 from handrail.collect.lerobot.configs import HandrailCockpitConfig, HandrailGamepadConfig
 from handrail.collect.lerobot.sim import HandrailSim
 from handrail.collect.lerobot.teleoperator import SimTeleoperator
@@ -69,5 +69,5 @@ class HandrailGamepad(SimTeleoperator):
     def _made(self, robot: HandrailSim) -> Any:
         robot.env.render_mode = "rgb_array"
         said = {each.name: getattr(robot.session, each.name) for each in fields(SessionConfig)}
-        config = RecordConfig(**said, teleop=self._settings)
-        return open_gamepad(config, robot.env, print, {robot.mode.name: robot.mode})
+        config = RecordConfig(**(said | {"operator": "gamepad"}), teleop=self._settings)
+        return open_device(config, robot.env, print, {robot.mode.name: robot.mode})

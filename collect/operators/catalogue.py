@@ -42,19 +42,19 @@ OPERATORS = Registry(
         ),
         OperatorSpec(
             "gamepad",
-            "handrail.collect.devices.open_devices:open_gamepad",
+            "handrail.collect.devices.open_devices:open_device",
             "a person with a gamepad at this computer",
             interactive=True,
         ),
         OperatorSpec(
             "spacemouse",
-            "handrail.collect.devices.open_devices:open_spacemouse",
+            "handrail.collect.devices.open_devices:open_device",
             "a person with a SpaceMouse",
             interactive=True,
         ),
         OperatorSpec(
             "keyboard",
-            "handrail.collect.devices.open_devices:open_keyboard",
+            "handrail.collect.devices.open_devices:open_device",
             "a person with the keys of this terminal",
             interactive=True,
         ),

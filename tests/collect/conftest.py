@@ -37,3 +37,19 @@ def new_page(chromium):
     for context in contexts:
         context.close()
     assert not errors
+
+
+@pytest.fixture
+def pad():
+    """Plug a gamepad of SDL's in."""
+    from device_players import VirtualPad
+
+    from handrail.collect.devices.device import DeviceGoneError
+    from handrail.collect.devices.gamepad import Gamepad
+
+    made = VirtualPad()
+    with pytest.raises(DeviceGoneError):  # also begins SDL
+        Gamepad().open()
+    made.plug_in()
+    yield made
+    made.unplug()

@@ -8,7 +8,7 @@ from fuzz_helpers import RudeOperator
 from processor_helpers import Clock
 
 from handrail.collect.lekiwi.body import LeKiwiBody
-from handrail.collect.lekiwi.client_plant import plant_of
+from handrail.collect.lekiwi.client_plant import ClientPlant
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import SEED, LeKiwiLoop
 from handrail.collect.lekiwi.link import Link
@@ -126,7 +126,10 @@ def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: floa
     """
     client, model = FarClient(latency, drop, seed), load_model("lekiwi")
     link = client.link = Link(client, "lekiwi", model, 0.05, True, client.clock, client.sleep)
-    plant = plant_of(link, lambda: seed)
+
+    def plant(robot, scene, q, period, **looks):
+        return ClientPlant(robot, scene, q, link, seed)
+
     env = HandrailEnv(PickPlace(), "lekiwi", fps=20, observes=False, real=True, plant=plant)
     env.reset(seed=seed)
     mpc = MaskedMpc(model)

@@ -120,7 +120,10 @@ def test_a_file_keeps_it(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"joints": {"tail": {}}}, "unknown entry 'tail'; expected some of shoulder_pan_joint"),
+        (
+            {"joints": {"tail": {"source": "a.pos", "scale": 1.0}}},
+            "unknown entry 'tail'; expected some of shoulder_pan_joint",
+        ),
         ({"joints": {UR10[0]: {"source": "a.pos", "scale": 0.0}}}, "scale: expected a finite number, not 0"),
         ({"joints": {UR10[0]: {"source": "a.pos", "scale": math.nan}}}, "scale"),
         ({"joints": {UR10[0]: 3}}, "expected a table"),

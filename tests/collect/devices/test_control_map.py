@@ -106,7 +106,7 @@ def test_a_persons_changes_win_and_an_empty_text_takes_away(tmp_path):
     ("text", "said"),
     [
         ('[arm]\na = "ee.vx"', "section 'arm': expected some of [hand], [turn], [base], [both], [joints]"),
-        ('[hand]\nlever = "ee.vx"', "[hand]: unknown control 'lever': expected one of a, b, back"),
+        ('[hand]\nlever = "ee.vx"', "[hand]: unknown entry 'lever'; expected some of a, b, back"),
         ('[hand]\na = "base.vx"', "[hand] a: expected one of ee.vx"),
         ('[actions]\na = "jump"', "[actions] a: expected one of hold, clutch"),
         ("[hand]\na = 3", "got 3"),

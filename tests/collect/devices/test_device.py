@@ -2,7 +2,6 @@
 
 import math
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -27,8 +26,3 @@ def test_farther_is_never_less(shape, one, other):
 def test_full_is_full_and_garbage_is_nothing(shape):
     assert shape(1.0) == shape(7.0) == 1.0
     assert shape(math.nan) == 0.0
-
-
-def test_fine_near_the_middle():
-    assert StickShape()(0.3) < 0.5 * StickShape(exponent=1.0)(0.3)
-    assert StickShape(0.0, 1.0)(0.3) == pytest.approx(0.3)

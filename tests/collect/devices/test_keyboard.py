@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from device_players import Clock, PlayedTerminal, recorded
+from device_players import PlayedTerminal, recorded
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,11 +10,6 @@ from handrail.collect.devices.key_bytes import NAMES, SIGNALS, Key, KeyBytes
 from handrail.collect.devices.keyboard import HELD, Keyboard
 
 LONG_AGO = 1e9  # [s]
-
-
-@pytest.fixture
-def clock():
-    return Clock()
 
 
 @pytest.fixture

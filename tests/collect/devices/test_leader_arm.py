@@ -3,18 +3,13 @@
 import math
 
 import pytest
-from device_players import Clock, recorded
+from device_players import recorded
 from played_leader import CALIBRATION, PLAYED, SOURCES, UR10, PlayedLeader, PlayedLeaderConfig
 
 from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.leader_arm import LeaderArm
 
 FIRST = recorded("leader.json")[0]["action"]
-
-
-@pytest.fixture
-def clock():
-    return Clock()
 
 
 @pytest.fixture(autouse=True)

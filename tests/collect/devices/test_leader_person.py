@@ -36,13 +36,6 @@ def turn(driven, **degrees):
     }
 
 
-def test_taking_hold_moves_nothing_however_the_leader_stands(driven):
-    assert not arm(driven).any()
-    turn(driven, pan=70.0)
-    clutch(driven)
-    assert np.abs(arm(driven)).max() < 1e-9
-
-
 def test_the_arm_moves_as_the_leader_does_since_the_clutch_held(driven):
     clutch(driven)
     arm(driven)

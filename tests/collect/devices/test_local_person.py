@@ -115,16 +115,6 @@ def test_the_terminals_keys_end_episodes_beside_every_device(device, key, event)
     assert driven.act() is event
 
 
-def test_the_end_of_a_recording_loses_no_episode_at_the_first_word():
-    driven = Driven("keyboard")
-    driven.begin()
-    answers = []
-    for _ in range(2):
-        driven.main.presses = ["escape"]
-        answers.append(driven.act())
-    assert answers == [EpisodeEvent.PAUSE, EpisodeEvent.QUIT]
-
-
 def test_keys_beside_a_gamepad_move_nothing():
     driven = Driven("gamepad", beside="keyboard")
     driven.begin()

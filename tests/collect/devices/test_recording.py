@@ -9,14 +9,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_helpers import command
-from device_players import PlayedHid, VirtualPad, recorded
+from device_players import PlayedHid, recorded
 from judges import doctor_fails, lint_defects
 from played_leader import CALIBRATION, PLAYED
 from terminal_player import TerminalPlayer
 
 from handrail.collect.devices.calibration import calibration_file, save_calibration
-from handrail.collect.devices.device import DeviceGoneError
-from handrail.collect.devices.gamepad import Gamepad
 from handrail.collect.devices.local_person import LocalPerson
 from handrail.collect.teleop_config import LeaderConfig
 
@@ -58,16 +56,6 @@ def test_a_reach_with_the_keys_of_a_terminal_and_lerobots_keys(tmp_path):
     assert 0.0 <= min(seen["teleop.age"]) <= max(seen["teleop.age"]) <= 0.25
     assert np.any(seen["teleop.raw"])
     assert max(seen["episode_index"]) == 1
-
-
-@pytest.fixture
-def pad():
-    made = VirtualPad()
-    with pytest.raises(DeviceGoneError):
-        Gamepad().open()
-    made.plug_in()
-    yield made
-    made.unplug()
 
 
 @pytest.fixture

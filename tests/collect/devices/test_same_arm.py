@@ -5,13 +5,14 @@ import pytest
 
 from handrail.collect.devices.calibration import same_arm
 from handrail.collect.devices.follower import Follower
+from handrail.collect.teleop_config import LeaderConfig
 from handrail.controllers.robot.model import load_model
 
 
 def test_the_arm_goes_as_many_degrees_as_its_leader():
     model = load_model("lekiwi")
     arm = model.description.arm_joints
-    calibration = same_arm("so101_leader", "", arm)
+    calibration = same_arm(LeaderConfig("so101_leader"), arm)
     follower, q = Follower(model, calibration), model.description.home
     leader = {f"{name}.pos": 10.0 * index for index, name in enumerate(arm)} | {"gripper.pos": 10.0}
     follower.targets(leader, True, q)
@@ -30,4 +31,4 @@ def test_the_arm_goes_as_many_degrees_as_its_leader():
     ],
 )
 def test_any_other_pair_is_calibrated(leader, options, robot):
-    assert same_arm(leader, options, load_model(robot).description.arm_joints) is None
+    assert same_arm(LeaderConfig(leader, options=options), load_model(robot).description.arm_joints) is None

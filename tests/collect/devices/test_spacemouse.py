@@ -3,18 +3,13 @@
 import sys
 
 import pytest
-from device_players import Clock, PlayedHid, recorded
+from device_players import PlayedHid, recorded
 
 from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.spacemouse import SpaceMouse
 from handrail.controllers.errors import HandrailError
 
 FORWARD = bytes.fromhex("010000a2fe0000")  # y = −350, and it counts backward
-
-
-@pytest.fixture
-def clock():
-    return Clock()
 
 
 @pytest.fixture

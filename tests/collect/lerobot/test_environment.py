@@ -43,15 +43,6 @@ def test_what_a_policy_reads_is_what_its_features_say(task):
     env.close()
 
 
-def test_an_episode_is_that_of_handrail_evaluate():
-    _, env = made(task="reach")
-    observation, _ = env.reset(seed=[5])
-    ours = build_env(SessionConfig(task="reach"), 20)
-    expected, _ = ours.reset(seed=FIRST_SEED + 5)
-    np.testing.assert_array_equal(observation["environment_state"][0], expected["environment_state"])
-    env.close()
-
-
 def test_actions_of_a_mode_are_completed():
     config, env = made(task="reach", mode="ee")
     assert config.features["action"].shape == (7,)

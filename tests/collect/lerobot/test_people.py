@@ -6,10 +6,7 @@ from itertools import count
 
 import pytest
 from cockpit_helpers import drive, page, told
-from device_players import VirtualPad
 
-from handrail.collect.devices.device import DeviceGoneError
-from handrail.collect.devices.gamepad import Gamepad
 from handrail.collect.lerobot import (
     HandrailCockpit,
     HandrailCockpitConfig,
@@ -73,16 +70,6 @@ def test_a_person_at_a_page_drives_and_takes_the_next_scene(robot, tmp_path):
             assert robot.get_observation()["scene"] == 1
     finally:
         teleop.disconnect()
-
-
-@pytest.fixture
-def pad():
-    made = VirtualPad()
-    with pytest.raises(DeviceGoneError):
-        Gamepad().open()
-    made.plug_in()
-    yield made
-    made.unplug()
 
 
 def test_a_person_with_a_gamepad_drives(robot, pad, tmp_path):

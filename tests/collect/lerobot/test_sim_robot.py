@@ -9,7 +9,7 @@ from lerobot_helpers import loop, steered
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot import HandrailScripted, HandrailScriptedConfig, HandrailSim, HandrailSimConfig
-from handrail.collect.lerobot.mode_action import AGAIN, BUTTONS, HOLD, NEXT
+from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT
 from handrail.collect.operators.modes import MODES
 from handrail.collect.seeds import evaluation_seed
 from handrail.collect.session.build import build_env
@@ -118,11 +118,6 @@ def test_scenes_are_those_of_the_recording_with_this_seed(tmp_path):
         assert second["goal.x.pos"] != start["goal.x.pos"]
     with steered(tmp_path, seed=3, episode=1) as (robot, _):
         assert robot.get_observation() == second
-
-
-def test_no_button_is_recorded(tmp_path):
-    with steered(tmp_path) as (robot, _):
-        assert not set(BUTTONS) & {*robot.action_features, *robot.observation_features}
 
 
 def test_a_teleoperator_needs_the_robot_that_it_steers(tmp_path):
