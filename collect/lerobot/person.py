@@ -6,7 +6,7 @@ While they do not steer, the robot brakes and time stands still. LeRobot's own k
 """
 
 import webbrowser
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from handrail.collect.cockpit.cockpit import Cockpit, check_installed
@@ -69,5 +69,5 @@ class HandrailGamepad(SimTeleoperator):
     def _made(self, robot: HandrailSim) -> Any:
         robot.env.render_mode = "rgb_array"
         said = {each.name: getattr(robot.session, each.name) for each in fields(SessionConfig)}
-        config = RecordConfig(**(said | {"operator": "gamepad"}), teleop=self._settings)
+        config = replace(RecordConfig(**said, teleop=self._settings), operator="gamepad")
         return open_device(config, robot.env, print, {robot.mode.name: robot.mode})
