@@ -15,11 +15,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from PIL import Image
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.disk import DiskWatch
+from handrail.collect.cockpit.episodes import EpisodeList, EpisodePoses
 from handrail.collect.cockpit.pipe import (
     ASK,
     DRIVE,
@@ -33,9 +35,8 @@ from handrail.collect.cockpit.pipe import (
     STILL,
     STOP,
 )
-from handrail.collect.cockpit.played import EpisodePoses, PlayedFiles
 from handrail.collect.cockpit.process import ServerProcess
-from handrail.collect.cockpit.snapshot import Counts, Snapshots
+from handrail.collect.cockpit.snapshot import Snapshots
 from handrail.collect.cockpit.strain import Strain
 from handrail.collect.config import RecordConfig
 from handrail.collect.operators.modes import TeleopMode
@@ -82,12 +83,11 @@ class Cockpit:
         next: Sequence[str] = (),
         say: Callable[[str], None] = lambda words: None,
     ) -> None:
-        self._model, self._server, self._folder, self._say = model, server, folder, say
-        self._wanted, self._next = wanted, next
-        self._played = PlayedFiles(server.keep, server.drop)
+        self._model, self._server, self._say = model, server, say
+        self._refuses, self._folder, self._wanted, self._next = refuses, folder, wanted, next
+        self._episodes, self._person = EpisodeList(server), Person(model, modes, first)
         self._disk = DiskWatch(Path(folder).absolute()) if folder else None
-        self._person = Person(model, modes, first)
-        self._counts, self._refuses, self._strain = Counts(), refuses, Strain()
+        self._strain = Strain()
         Image.preinit()  # else the first picture of an episode waits for that
         self._dropped: dict[str, int] = {}
         self._pictured = self._acted = -math.inf
@@ -119,24 +119,22 @@ class Cockpit:
         self._person.reset(view, rng)
 
     def act(self, view: View) -> Intent | EpisodeEvent:
-        """Return the intent now, or what becomes of the episode."""
+        """Return the intent now, or what becomes of the episode; let the page have this moment."""
         now = time.monotonic()
         if now < self._acted + 1.0:  # else an undo, or a new episode
             self._strain.note(now - self._acted - self._env.period)
         self._listen()
         answer = self._person.act(view)
-        self._show(view, now)
+        moment = self._snapshots.now(view, self._person, now) | {
+            "saved": self._episodes.saved,
+            "succeeded": self._episodes.succeeded,
+            "commanded": round(self._acted + self._delay, 4) if self._delay else 0.0,
+            "dropped": self._all_dropped,
+            "disk": self._disk.left if self._disk else (-1, -1),
+        }
+        self._server.send(FRAME, json.dumps(moment, separators=(",", ":")).encode())
         self._acted, self._delay = now, 0.0
         return answer
-
-    def _show(self, view: View, now: float) -> None:
-        """Let the page have this moment."""
-        moment = self._snapshots.now(view, self._person, now)
-        moment["saved"], moment["succeeded"] = self._counts.saved, self._counts.succeeded
-        moment["commanded"] = round(self._acted + self._delay, 4) if self._delay else 0.0
-        moment["dropped"] = self._all_dropped
-        moment["disk"] = self._disk.left if self._disk else (-1, -1)
-        self._server.send(FRAME, json.dumps(moment, separators=(",", ":")).encode())
 
     def see(self, frame: Frame) -> None:
         """Show how the controller fared, and what the cameras see."""
@@ -145,14 +143,14 @@ class Cockpit:
         self._poses.see(frame.number, self._env.simulation.data)
         if frame.images and time.monotonic() > self._pictured + 0.9 * self._strain.picture_period:
             self._pictured = time.monotonic()
-            for index, name in enumerate(frame.images):
-                self._server.send(PICTURE, bytes([index]) + _jpeg(frame.images[name]))
+            for index, picture in enumerate(frame.images.values()):
+                self._server.send(PICTURE, bytes([index]) + _jpeg(picture))
 
     def end(self, outcome: Outcome) -> None:
         """Count an episode; keep its poses, if it is kept."""
-        self._counts.add(outcome, self._played.add(self._poses.file()) if outcome.kept else "")
+        self._episodes.add(outcome, self._poses)
         if self._disk:
-            self._disk.saved(self._counts.saved)
+            self._disk.saved(self._episodes.saved)
         self._send_stage()
 
     def close(self) -> None:
@@ -164,9 +162,9 @@ class Cockpit:
             self._say(f"dropped or refused by the page's server: {counts}")
         if self._disk:
             self._disk.close()
-        counts = self._counts
-        said = {"saved": counts.saved, "succeeded": counts.succeeded, "folder": self._folder}
-        said["next"] = list(self._next) if counts.saved else []
+        saved, succeeded = self._episodes.saved, self._episodes.succeeded
+        said = {"saved": saved, "succeeded": succeeded, "folder": self._folder}
+        said["next"] = list(self._next) if saved else []
         self._server.send_surely(OVER, json.dumps(said).encode())
         self._server.close()
 
@@ -190,74 +188,59 @@ class Cockpit:
                 self._dropped = json.loads(data)
             elif kind == DRIVE:
                 said = json.loads(data)
-                lists = {name: tuple(said["inputs"][name]) for name in ("axes", "targets")}
-                inputs = Input(**(said["inputs"] | lists))
+                inputs = msgspec.convert(said["inputs"], Input)
                 self._person.take(inputs, said["received"], said["round_trip"])
             elif kind in (ASK, STILL):
                 said = json.loads(data)
-                if said["what"] in self._refuses:
-                    continue
-                value = said["value"]
-                self._person.ask(Ask(said["what"], tuple(value) if isinstance(value, list) else value))
+                value = tuple(said["value"]) if isinstance(said["value"], list) else said["value"]
+                if said["what"] not in self._refuses:
+                    self._person.ask(Ask(said["what"], value))
 
     def _send_stage(self) -> None:
         """Say what there is to draw and to choose from."""
-        compiled = self._env.simulation.mujoco_model
+        env, robot, person = self._env, self._model.description, self._person
+        compiled, channels = env.simulation.mujoco_model, person.meaning.channels
         digest, data = stage.meshes(compiled)
         self._server.keep(f"{digest}.bin", data)
-        limits = self._model.description.limits
-        channels = self._person.meaning.channels
-        said = json.dumps(self._stage(compiled, digest, limits, channels)).encode()
-        self._server.send_surely(STAGE, said, (STAGE,))
-
-    def _stage(self, compiled: Any, digest: str, limits: Any, channels: Any) -> dict[str, Any]:
-        modes = self._person.modes
-        return {
+        said: dict[str, Any] = {
             "shapes": stage.shapes(compiled),
             "meshes": digest,
-            "task": self._env.task_description,
-            "horizon": self._env.task.horizon,
-            "robot": self._model.description.name,
+            "task": env.task_description,
+            "horizon": env.task.horizon,
+            "robot": robot.name,
             "channels": channels.names,
             "joints": self._model.joints,
-            "lower": [_known(x) for x in limits.position_lower],
-            "upper": [_known(x) for x in limits.position_upper],
+            "lower": [_known(x) for x in robot.limits.position_lower],
+            "upper": [_known(x) for x in robot.limits.position_upper],
             "base": len(channels.base),
             "modes": [
-                {"name": mode.name, "help": mode.help, "focus": mode.by_focus} for mode in modes.values()
+                {"name": mode.name, "help": mode.help, "focus": mode.by_focus}
+                for mode in person.modes.values()
             ],
             "refuses": sorted(self._refuses),
-            "cameras": self._env.cameras,
-            "gripper": self._model.description.end_effector.gripper is not None,
-            "grips": bool(self._env.start.scene.movables),
-            "episodes": [each | {"played": self._there(each["played"])} for each in self._counts.episodes],
+            "cameras": env.cameras,
+            "gripper": robot.end_effector.gripper is not None,
+            "grips": bool(env.start.scene.movables),
+            "episodes": self._episodes.described(),
             "folder": self._folder,
             "wanted": self._wanted,
             "hand": stage.hand(compiled),
-            "scale": self._model.description.world.scale,
-            "base_size": self._model.description.base.size if len(channels.base) else (),
+            "scale": robot.world.scale,
+            "base_size": robot.base.size if len(channels.base) else (),
         }
-
-    def _there(self, played: str) -> str:
-        return played if played in self._played else ""
+        self._server.send_surely(STAGE, json.dumps(said).encode(), (STAGE,))
 
 
 def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], None]) -> Cockpit:
-    """Return a cockpit, and say where it is.
-
-    Args:
-        config: of the recording.
-        env: of the recording.
-        say: is told the address.
-    """
+    """Return the cockpit of a recording, and say where it is."""
     check_installed()
     modes = build_modes(config, env)
     server = ServerProcess(config.cockpit, say)
+    folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
     say(f"Drive at {server.address}")
-    say(f"Episodes go to {config.dataset.folder}. To end: End recording on the page, or Ctrl-C here.")
+    say(f"Episodes go to {folder}. To end: End recording on the page, or Ctrl-C here.")
     if config.cockpit.opens:
         webbrowser.open(server.address)
-    folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
     then = [
         f"handrail-inspect {folder}",
         f"handrail-replay {folder}",

@@ -1,4 +1,4 @@
-"""How much room is left for episodes: measured beside the loop that drives, which waits for no disk."""
+"""The room that is left for episodes: measured beside the loop that drives, which waits for no disk."""
 
 import shutil
 import threading
@@ -8,24 +8,18 @@ _PERIOD = 5.0  # between two looks [s]
 
 
 class DiskWatch:
-    """Looks every few seconds, in a thread of its own.
+    """Looks every few seconds, in a thread of its own, at a dataset's folder; it need not exist yet.
 
-    Args:
-        folder: of the dataset; it need not exist yet.
+    Attributes:
+        left: free [bytes], and about how many episodes that is; -1 where it is unknown.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._saved = folder, 0
-        self._free, self._episodes = -1, -1
+        self._folder, self._saved, self.left = folder, 0, (-1, -1)
         self._before = self._used = self._walked = -1
-        self._over, self._again = threading.Event(), threading.Event()
+        self._is_over, self._again = False, threading.Event()
         self._thread = threading.Thread(target=self._watch, name="disk", daemon=True)
         self._thread.start()
-
-    @property
-    def left(self) -> tuple[int, int]:
-        """Free [bytes], and about how many episodes that is; -1 for what nobody knows."""
-        return self._free, self._episodes
 
     def saved(self, episodes: int) -> None:
         """Take note of how many episodes were saved since this began."""
@@ -34,12 +28,12 @@ class DiskWatch:
 
     def close(self) -> None:
         """Look no more."""
-        self._over.set()
+        self._is_over = True
         self._again.set()
         self._thread.join(1.0)  # a disk that hangs does not keep the recording from ending
 
     def _watch(self) -> None:
-        while not self._over.is_set():
+        while not self._is_over:
             self._look()
             self._again.wait(_PERIOD)
             self._again.clear()
@@ -56,4 +50,4 @@ class DiskWatch:
         except (OSError, StopIteration):  # it is gone, or a file of it was, between two looks
             return
         grown = self._used - self._before
-        self._free, self._episodes = free, int(free * saved / grown) if grown > 0 else -1
+        self.left = free, int(free * saved / grown) if grown > 0 else -1

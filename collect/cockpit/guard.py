@@ -1,4 +1,4 @@
-"""Who may come in: any page of the cockpit's own; from elsewhere, and where it is asked for, with the token.
+"""Access: any page of the cockpit's own; from elsewhere, and where it is asked for, with the token.
 
 Every request is checked for the `Host` it asks for, every socket and form for the `Origin` of the page that
 makes it, so that no other page in the same browser, nor a name that was made to point here, gets in.
@@ -30,7 +30,7 @@ class Guard:
         clock: [s].
 
     Attributes:
-        token: what a person must know.
+        token: that a person must know.
         refused: requests turned away.
     """
 
@@ -38,8 +38,7 @@ class Guard:
         self, private: bool, scheme: str, secret: str, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._private, self._scheme, self._secret, self._clock = private, scheme, secret.encode(), clock
-        self.token = self._signed("token")
-        self.refused = 0
+        self.token, self.refused = self._signed("token"), 0
         self._failures: dict[str, list[float]] = {}
 
     def admits(self, headers: Mapping[str, str], cookies: Mapping[str, str], address: str) -> bool:
@@ -56,9 +55,7 @@ class Guard:
             origin: whether it must say which page it comes from.
         """
         host, said = headers.get("host", ""), headers.get("origin")
-        if not _is_address(host):
-            return False
-        return said == f"{self._scheme}://{host}" or (said is None and not origin)
+        return _is_address(host) and (said == f"{self._scheme}://{host}" or (said is None and not origin))
 
     def log_in(self, token: str, address: str) -> str:
         """Return a new session for the token; empty for a wrong one.
@@ -67,7 +64,7 @@ class Guard:
         """
         if not hmac.compare_digest(token.encode(), self.token.encode()):
             self._failures[address] = [*self._recent(address), self._clock()][-_FAILURES:]
-            while len(self._failures) > _MOST_ADDRESSES:
+            if len(self._failures) > _MOST_ADDRESSES:
                 self._failures.pop(next(iter(self._failures)))
             self.refused += 1
             return ""
@@ -83,9 +80,8 @@ class Guard:
 
     def _is_known(self, session: str, address: str) -> bool:
         note, _, signature = session.rpartition(".")
-        if not hmac.compare_digest(signature.encode(), self._signed(note, address).encode()):
-            return False
-        return self._clock() < float(note.partition(".")[0])
+        is_signed = hmac.compare_digest(signature.encode(), self._signed(note, address).encode())
+        return is_signed and self._clock() < float(note.partition(".")[0])
 
     def _signed(self, *words: str) -> str:
         return hmac.new(self._secret, "\n".join(words).encode(), hashlib.sha256).hexdigest()[:43]
@@ -94,10 +90,7 @@ class Guard:
 def _is_address(host: str) -> bool:
     """Whether a Host header names an address, or this computer as itself; other names can be anyone's."""
     name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
-    if name == "localhost":
-        return True
     try:
-        ipaddress.ip_address(name.strip("[]"))
+        return name == "localhost" or bool(ipaddress.ip_address(name.strip("[]")))
     except ValueError:
         return False
-    return True

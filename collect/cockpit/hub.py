@@ -6,12 +6,11 @@ import json
 import time
 from collections import Counter, deque
 from dataclasses import asdict, replace
-from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handrail.collect.cockpit.lease import Lease
-from handrail.collect.cockpit.messages import LEASE, CardAnswer, Drive, Said, Stop, parse, stills
+from handrail.collect.cockpit.messages import LEASE, CardAnswer, Drive, Message, Stop, parse, stills
 from handrail.collect.cockpit.page_socket import REPLACED, PageSocket
 from handrail.collect.cockpit.pipe import (
     ANSWER,
@@ -35,62 +34,52 @@ from handrail.controllers.errors import HandrailError
 MOST_PAGES = 32
 MOST_LATE = 0.3  # for how long there may have been a newer picture than the one that an input answers [s]
 _LAST_WORDS = 0.5  # for which a page that is cut off may still say STOP [s]
+_WORDS = {STAGE: "stage", CARD: "card", OVER: "over", FRAME: "frame"}  # of the recording, for pages
 
 
 class Hub:
     """Passes frames to the pages, and the driver's input to the recording.
 
-    Args:
-        pipe: to the recording.
-
     Attributes:
+        strain: how late this server's loop is.
         counts: what was dropped or refused, by why.
     """
 
     def __init__(self, pipe: Pipe) -> None:
-        self._pipe, self._lease, self._strain = pipe, Lease(), Strain()
+        self._pipe, self._lease, self.strain = pipe, Lease(), Strain()
         self._pages: set[PageSocket] = set()
-        self._stage = self._card = ""
+        self._kept: dict[bytes, str] = {}  # scene, card and end, as pages that come later hear them too
         self._stamps: deque[float] = deque(maxlen=64)  # of the frames that pages have got
         self._presses: deque[int] = deque(maxlen=64)  # of STOP that were heard
         self._stopped = -1.0  # when it was said last [s]
-        self._was_free, self._is_over = True, False
+        self._was_free = True
         self.counts: Counter[str] = Counter()
 
     @property
     def is_leaving(self) -> bool:
         """Whether pages that have been told that it is over are still there: they go when they hear it."""
-        return self._is_over and bool(self._pages)
+        return OVER in self._kept and bool(self._pages)
 
     def hear(self) -> None:
         """Pass on what the recording has sent."""
-        newest: dict[Any, bytes] = {}
+        newest: dict[bytes, bytes] = {}
         for kind, data in self._pipe.receive():
-            newest[kind if kind != PICTURE else (PICTURE, data[:1])] = data
+            newest[kind + data[:1] if kind == PICTURE else kind] = data
             if kind == FRAME:  # also one that no page gets: inputs that do not answer it may be late
                 self._stamps.append(json.loads(data)["stamp"])
-        now = time.monotonic()
         for kind, data in newest.items():
-            if kind == STAGE:
-                self._stage = f'{{"kind":"stage","stage":{data.decode()}}}'
-                for page in self._pages:
-                    page.offer(STAGE, self._stage)
-            elif kind == OVER:
-                self._is_over = True
-                for page in self._pages:
-                    page.offer(OVER, f'{{"kind":"over","over":{data.decode()}}}')
-            elif kind == CARD:
-                self._card = f'{{"kind":"card","card":{data.decode()}}}'
-                self._deal()
-            elif kind == FRAME:
-                self._show(f'{{"kind":"frame","frame":{data.decode()}}}', now)
-            else:
-                for page in self._pages:
-                    page.offer_each(kind, data, now, 0.9 * self._strain.picture_period)
-
-    def note_lag(self, lag: float) -> None:
-        """Take by how much this server's loop was late [s]."""
-        self._strain.note(lag)
+            word = _WORDS.get(kind)
+            said = f'{{"kind":"{word}","{word}":{data.decode()}}}' if word else data
+            if isinstance(said, str) and kind != FRAME:
+                self._kept[kind] = said
+            for page in self._pages:
+                drives = self._lease.drives(page.name)
+                if kind == FRAME:  # the driver has every one, the others some
+                    page.offer(kind, said, 0.0 if drives else 0.9 * self.strain.spectator_period)
+                elif kind in (STAGE, OVER) or (kind == CARD and drives):
+                    page.offer(kind, said)
+                elif not word:
+                    page.offer(kind, said, 0.9 * self.strain.picture_period)
 
     def keep_up(self) -> None:
         """Send what waits for the recording; tell the pages when the lease has become free."""
@@ -113,14 +102,17 @@ class Hub:
             return
         await socket.accept()
         page = PageSocket(socket, name)
-        await self._replace(page)
+        for other in [other for other in self._pages if other.name == name]:
+            self._part(other)  # a reload, or a copy of the tab; one of them drives at most
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+                await other.socket.close(REPLACED)
         self._pages.add(page)
         delivery = asyncio.create_task(page.deliver())
         try:
             if self._lease.is_free_for(name):
                 self._lease.take(name)
-            if self._stage:
-                page.offer(STAGE, self._stage)
+            if STAGE in self._kept:
+                page.offer(STAGE, self._kept[STAGE])
             self._tell_all()
             await self._listen(page, delivery)
         except (WebSocketDisconnect, RuntimeError, TimeoutError):
@@ -129,13 +121,6 @@ class Hub:
             delivery.cancel()
             page.end()
             self._part(page)
-
-    async def _replace(self, page: PageSocket) -> None:
-        """Let go of a page of the same name: a reload, or a copy of the tab; one of them drives at most."""
-        for other in [other for other in self._pages if other.name == page.name]:
-            self._part(other)
-            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-                await other.socket.close(REPLACED)
 
     def _part(self, page: PageSocket) -> None:
         """Take note that a page is gone."""
@@ -160,35 +145,27 @@ class Hub:
     def _take_all(self, page: PageSocket, heard: list[str | bytes], now: float) -> None:
         """Take messages that came together: STOP first, whatever was said before it.
 
-        Before it, and beyond what a page may say, only what takes motion away counts.
+        Before it, and beyond what a page may say, only what takes motion away counts; a press that is said
+        again counts once.
         """
         said = [_parsed(each) for each in heard]
-        stops = [n for n, each in enumerate(said) if isinstance(each, Stop) and self._is_new(each)]
-        if stops:
-            self._stop(said, now)
+        presses = {n: each.press for n, each in enumerate(said) if isinstance(each, Stop)}
+        stops = {n: press for n, press in presses.items() if press not in self._presses}
+        if stops:  # anyone who sees danger may
+            self._presses.extend(filter(None, presses.values()))
+            self._stopped = now
+            self._pipe.send_surely(STOP, b"", (STOP, ASK))
         for number, each in enumerate(said if not page.is_cut else ()):
             may = page.may_say(now)
-            if isinstance(each, HandrailError):
-                self._refuse(page, each)
-            elif stills(each) or (may and number >= max(stops, default=0)):
-                self._try(page, each, now)
-            else:
-                self.counts["messages before a stop" if may else "messages too fast"] += 1
-
-    def _is_new(self, stop: Stop) -> bool:
-        return stop.press not in self._presses
-
-    def _stop(self, said: list[Said | HandrailError], now: float) -> None:
-        """Stop the robot: anyone who sees danger may; a press that is said again counts once."""
-        self._presses.extend(each.press for each in said if isinstance(each, Stop) and each.press)
-        self._stopped = now
-        self._pipe.send_surely(STOP, b"", (STOP, ASK))
-
-    def _try(self, page: PageSocket, said: Said, now: float) -> None:
-        try:
-            self._take(page, said, now)
-        except HandrailError as error:
-            self._refuse(page, error)
+            try:
+                if isinstance(each, HandrailError):
+                    raise each
+                if stills(each) or (may and number >= max(stops, default=0)):
+                    self._take(page, each, now)
+                else:
+                    self.counts["messages before a stop" if may else "messages too fast"] += 1
+            except HandrailError as error:
+                self._refuse(page, error)
 
     def _refuse(self, page: PageSocket, error: HandrailError) -> None:
         """Count a message that makes no sense; whoever drives so drives no more."""
@@ -198,13 +175,7 @@ class Hub:
             self._lose()
         page.say("error", error=str(error))
 
-    def _deal(self) -> None:
-        """Show the card to the page that drives: what a person answers is for nobody else."""
-        for page in self._pages:
-            if self._card and self._lease.drives(page.name):
-                page.offer(CARD, self._card)
-
-    def _take(self, page: PageSocket, said: Said, now: float) -> None:
+    def _take(self, page: PageSocket, said: Message, now: float) -> None:
         if isinstance(said, Stop):
             return  # it was heard first
         if isinstance(said, Ask) and said.what in LEASE:
@@ -215,22 +186,20 @@ class Hub:
             self._tell_all()
         elif not self._lease.drives(page.name):
             self.counts["input of who does not drive"] += 1
-        elif isinstance(said, CardAnswer):
-            self._pipe.send_surely(ANSWER, json.dumps(asdict(said)).encode())
         elif isinstance(said, Drive):
             self._drive(page, said, now)
-        elif said.what == "stop" and page.echo <= self._stopped:  # said before it could be seen
+        elif isinstance(said, Ask) and said.what == "stop" and page.echo <= self._stopped:  # not yet seen
             page.say("error", error="release: expected of a page that saw the robot stopped; press it again")
-        elif stills(said):
-            self._pipe.send_surely(STILL, json.dumps(asdict(said)).encode())
-        elif self._stage:
-            self._pipe.send_surely(ASK, json.dumps(asdict(said)).encode())
+        else:
+            kind = ANSWER if isinstance(said, CardAnswer) else STILL if stills(said) else ASK
+            if kind != ASK or STAGE in self._kept:
+                self._pipe.send_surely(kind, json.dumps(asdict(said)).encode())
 
     def _drive(self, page: PageSocket, said: Drive, now: float) -> None:
         """Pass an input on; who answers an old picture cannot steer, only let go."""
-        if said.echo > now or said.sequence <= page.sequence:
+        if said.echo > now or said.seq <= page.sequence:
             raise HandrailError("drive: expected a time that this server has said, and seq to count up")
-        page.sequence = said.sequence
+        page.sequence = said.seq
         page.answered(said.echo, now)
         self.hear()  # which pictures there have been meanwhile, also while this server stood still
         newer = next((stamp for stamp in self._stamps if stamp > said.echo), now)
@@ -239,7 +208,7 @@ class Hub:
             page.is_late = is_late
             self._tell(page)
         self.counts["input that came too late"] += is_late
-        inputs = asdict(replace(said.inputs, on=said.inputs.on and not is_late))
+        inputs = asdict(replace(said.inputs, on=said.on and not is_late))
         forward = json.dumps({"inputs": inputs, "received": now, "round_trip": page.round_trip}).encode()
         if stills(said):
             self._pipe.send_surely(DRIVE, forward, (DRIVE,))
@@ -250,19 +219,12 @@ class Hub:
         """Tell the recording that nobody drives now: who does next has to begin anew."""
         self._pipe.send_surely(LOST, b"", (LOST, ASK))
 
-    def _show(self, frame: str, now: float) -> None:
-        """Let the driver have every frame, the others some."""
-        for page in self._pages:
-            driving = self._lease.drives(page.name)
-            page.offer_each(FRAME, frame, now, 0.0 if driving else 0.9 * self._strain.spectator_period)
-
     def _tell_all(self) -> None:
         for page in self._pages:
             self._tell(page)
-        self._deal()
 
     def _tell(self, page: PageSocket) -> None:
-        """Tell a page whether it drives, and who else is there."""
+        """Tell a page whether it drives, and who else is there; a card is for the driver alone."""
         driving = self._lease.drives(page.name)
         page.say(
             "you",
@@ -273,9 +235,11 @@ class Hub:
             asking=self._lease.asking == page.name,
             late=driving and page.is_late,
         )
+        if driving and CARD in self._kept:
+            page.offer(CARD, self._kept[CARD])
 
 
-def _parsed(message: str | bytes) -> Said | HandrailError:
+def _parsed(message: str | bytes) -> Message | HandrailError:
     try:
         return parse(message)
     except HandrailError as error:

@@ -1,6 +1,4 @@
-"""Where what is asked would lead the robot, if it did just that: the ghosts on the page."""
-
-from dataclasses import dataclass
+"""Where an intent would lead the robot, if it did just that: the ghosts on the page."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,56 +12,27 @@ from handrail.controllers.robot.model import Pose, RobotModel
 AHEAD = 0.6  # how far the ghosts are ahead [s]
 
 
-@dataclass(frozen=True)
-class Lead:
-    """Where the intent leads.
-
-    Attributes:
-        hand: its pose; None where nobody asks it to move.
-        base: x, y [m] and yaw [rad] in the world, (3,); None likewise.
-    """
-
-    hand: Pose | None = None
-    base: FloatArray | None = None
-
-
-class Leads:
-    """Finds where intents lead.
-
-    Args:
-        model: of the robot.
-    """
-
-    def __init__(self, model: RobotModel) -> None:
-        self._model, self._channels = model, Channels.of(model.description)
-        self._base = len(self._channels.base)
-
-    def find(self, intent: Intent, tool: Pose, q: FloatArray) -> Lead:
-        """Return where an intent leads within `AHEAD`, at the velocity that it asks for.
-
-        Args:
-            intent: what is asked.
-            tool: where the hand is.
-            q: of the robot, (n,) [m, rad].
-        """
-        asked = np.where(intent.mask, np.nan_to_num(intent.values), 0.0)
-        twist, joints = asked[self._channels.tool_slice], asked[self._channels.joint_slice]
-        hand = None
-        if twist.any():
-            hand = _moved(tool, twist, intent.frames.tool == "tool")
-        elif joints[self._base :].any():
-            hand = self._model.pose(q + AHEAD * joints)
-        return Lead(hand, self._base_ahead(asked[self._channels.base_slice], joints, q))
-
-    def _base_ahead(self, twist: FloatArray, joints: FloatArray, q: FloatArray) -> FloatArray | None:
-        base = slice(0, self._base)
-        if twist.any():
-            return q[base] + AHEAD * turned(twist, q[2] + 0.5 * AHEAD * twist[2])
-        return q[base] + AHEAD * joints[base] if joints[base].any() else None
+def hand_ahead(model: RobotModel, intent: Intent, tool: Pose, q: FloatArray) -> Pose | None:
+    """Return the hand's pose within `AHEAD`, at the velocity that is asked for; None where none is."""
+    channels, asked = Channels.of(model.description), _asked(intent)
+    twist, joints = asked[channels.tool_slice], asked[channels.joint_slice]
+    if twist.any():
+        in_tool = intent.frames.tool == "tool"
+        linear, angular = (tool.rotation @ part if in_tool else part for part in (twist[:3], twist[3:]))
+        turn = Rotation.from_rotvec(AHEAD * angular).as_matrix()
+        return Pose(tool.position + AHEAD * linear, turn @ tool.rotation)
+    return model.pose(q + AHEAD * joints) if joints[len(channels.base) :].any() else None
 
 
-def _moved(tool: Pose, twist: FloatArray, in_tool: bool) -> Pose:
-    """Return a pose moved by a twist (v, ω), (6,), meant in the world or in the tool, for `AHEAD`."""
-    linear, angular = (tool.rotation @ part if in_tool else part for part in (twist[:3], twist[3:]))
-    turn = Rotation.from_rotvec(AHEAD * angular).as_matrix()
-    return Pose(tool.position + AHEAD * linear, turn @ tool.rotation)
+def base_ahead(model: RobotModel, intent: Intent, q: FloatArray) -> FloatArray | None:
+    """Return the base's x, y [m] and yaw [rad] in the world, (3,), within `AHEAD`; None likewise."""
+    channels, asked = Channels.of(model.description), _asked(intent)
+    base = slice(0, len(channels.base))
+    twist, joints = asked[channels.base_slice], asked[channels.joint_slice][base]
+    if twist.any():
+        return q[base] + AHEAD * turned(twist, q[2] + 0.5 * AHEAD * twist[2])
+    return q[base] + AHEAD * joints if joints.any() else None
+
+
+def _asked(intent: Intent) -> FloatArray:
+    return np.where(intent.mask, np.nan_to_num(intent.values), 0.0)

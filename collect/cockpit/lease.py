@@ -1,4 +1,4 @@
-"""Who drives: one page at a time; the others watch, and may ask for it."""
+"""The lease: one page drives at a time; the others watch, and may ask for it."""
 
 import time
 from collections.abc import Callable
@@ -8,9 +8,6 @@ _RESERVED = 5.0  # how long a page that was cut off may come back to its lease [
 
 class Lease:
     """Says which page drives.
-
-    Args:
-        clock: [s].
 
     Attributes:
         holder: the page that drives, by its own name; empty for none.
@@ -33,9 +30,8 @@ class Lease:
 
     def is_free_for(self, page: str) -> bool:
         """Whether a page may drive at once."""
-        if page == self.holder or not self.holder:
-            return True
-        return not self._is_there and self._clock() > self._left_at + _RESERVED
+        is_reserved = self._is_there or self._clock() <= self._left_at + _RESERVED
+        return page == self.holder or not self.holder or not is_reserved
 
     def give(self, page: str) -> None:
         """Let whoever asks drive instead of a page, or nobody."""

@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from typing import Any
+import time
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -32,11 +32,11 @@ class PageSocket:
     def __init__(self, socket: WebSocket, name: str) -> None:
         self.socket, self.name = socket, name
         self.sequence, self.echo, self.round_trip, self.is_late = -1, 0.0, 0.0, False
-        self._newest: dict[Any, str | bytes] = {}
-        self._waiting = asyncio.Event()
-        self._next: dict[Any, float] = {}
         self.bad = self.too_fast = 0
         self._allowance, self._before = _MOST_MESSAGES, 0.0
+        self._newest: dict[bytes | str, str | bytes] = {}
+        self._next: dict[bytes | str, float] = {}
+        self._waiting = asyncio.Event()
         self._coming = asyncio.ensure_future(socket.receive())
 
     @property
@@ -75,16 +75,13 @@ class PageSocket:
         """Hear no more."""
         self._coming.cancel()
 
-    def offer(self, kind: Any, data: str | bytes) -> None:
-        """Let it have a message; an older one of its kind that still waits is dropped."""
-        self._newest[kind] = data
-        self._waiting.set()
-
-    def offer_each(self, kind: Any, data: str | bytes, now: float, period: float) -> None:
-        """Let it have a message of a kind of which it gets one a period [s]."""
-        if now >= self._next.get(kind, 0.0):
+    def offer(self, kind: bytes | str, data: str | bytes, period: float = 0.0) -> None:
+        """Let it have a message instead of an older one of its kind that still waits, one a period [s]."""
+        now = time.monotonic()
+        if not period or now >= self._next.get(kind, 0.0):
             self._next[kind] = now + period
-            self.offer(kind, data)
+            self._newest[kind] = data
+            self._waiting.set()
 
     def say(self, kind: str, **words: object) -> None:
         """Let it have a small message."""
@@ -107,6 +104,5 @@ class PageSocket:
             while self._newest:
                 kind = next(iter(self._newest))
                 data = self._newest.pop(kind)
-                socket = self.socket
-                send = socket.send_bytes(data) if isinstance(data, bytes) else socket.send_text(data)
-                await asyncio.wait_for(send, SLOW)
+                send = self.socket.send_bytes if isinstance(data, bytes) else self.socket.send_text
+                await asyncio.wait_for(send(data), SLOW)  # pyright: ignore[reportArgumentType]

@@ -17,45 +17,24 @@ _BUFFER = 2**20  # asked for; the system may give less [bytes]
 _MOST_WAITING = 64  # messages
 _MORE, _LAST = b"+", b"."
 
-SETTINGS, FRAME, PICTURE, STAGE, CARD, OVER = (
-    b"C",
-    b"F",
-    b"P",
-    b"S",
-    b"Q",
-    b"O",
-)  # what the recording sends
-NOTE, DRIVE, ASK, STILL, STOP, LOST, DROPPED, ANSWER = (
-    b"N",
-    b"D",
-    b"A",
-    b"a",
-    b"!",
-    b"L",
-    b"-",
-    b"R",
-)  # what the server sends
+# from the recording, and from the server
+FRAME, PICTURE, STAGE, CARD, OVER = b"F", b"P", b"S", b"Q", b"O"
+NOTE, DRIVE, ASK, STILL, STOP, LOST, DROPPED, ANSWER = b"N", b"D", b"A", b"a", b"!", b"L", b"-", b"R"
 _STILL = (STOP, LOST, STILL, DRIVE)  # what takes motion away: inputs only wait where all is let go
 
 
 class Pipe:
-    """One end.
-
-    Args:
-        end: of a connected socket pair that keeps packets apart.
-
-    Attributes:
-        dropped: messages for which there was no room, by kind.
-    """
+    """One end of a connected socket pair that keeps packets apart."""
 
     def __init__(self, end: socket.socket) -> None:
         end.setblocking(False)
         for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
             end.setsockopt(socket.SOL_SOCKET, option, _BUFFER)
         self._socket = end
-        self.dropped: Counter[bytes] = Counter()
-        self._begun: deque[bytes] = deque()  # packets of a message whose first one is gone
-        self._waiting: deque[tuple[bytes, bytes]] = deque()
+        self.dropped = Counter[bytes]()
+        """Messages for which there was no room, by kind."""
+        self._begun = deque[bytes]()  # packets of a message whose first one is gone
+        self._waiting = deque[tuple[bytes, bytes]]()
         self._parts: list[bytes] = []  # of a message that comes in
 
     @staticmethod
@@ -71,6 +50,8 @@ class Pipe:
         """Send a message if there is room for it now; return whether there was."""
         went = self.flush() and len(data) <= LARGEST and self._begin(kind, data)
         self.dropped[kind] += not went
+        if went:
+            self.flush()
         return went
 
     def send_surely(self, kind: bytes, data: bytes, instead_of: Collection[bytes] = ()) -> None:
@@ -80,11 +61,10 @@ class Pipe:
 
         Args:
             kind: of the message.
-            data: what it says.
-            instead_of: kinds that are out of date with it: what waits of them is dropped.
+            data: content of the message.
+            instead_of: kinds that are out of date with it: those that wait are dropped.
         """
-        stale = [each for each in self._waiting if each[0] in instead_of or each == (kind, data)]
-        for each in stale:
+        for each in [each for each in self._waiting if each[0] in instead_of or each == (kind, data)]:
             self._waiting.remove(each)
         is_full = len(self._waiting) >= _MOST_WAITING and kind not in _STILL
         if is_full or len(data) > LARGEST:
@@ -95,16 +75,15 @@ class Pipe:
 
     def flush(self) -> bool:
         """Send what waits, as far as there is room; return whether nothing waits any more."""
-        while self._begun:
-            if not self._push(self._begun[0]):
-                return False
-            self._begun.popleft()
-        while self._waiting:
-            if not self._begin(*self._waiting[0]):
-                return False
-            self._waiting.popleft()
+        while self._begun or self._waiting:
             if self._begun:
-                return self.flush()
+                if not self._push(self._begun[0]):
+                    return False
+                self._begun.popleft()
+            elif self._begin(*self._waiting[0]):
+                self._waiting.popleft()
+            else:
+                return False
         return True
 
     def receive(self) -> list[tuple[bytes, bytes]]:
@@ -129,14 +108,13 @@ class Pipe:
         self._socket.close()
 
     def _begin(self, kind: bytes, data: bytes) -> bool:
-        """Send a message's first packet, and the others as far as there is room."""
-        parts = [data[start : start + _PACKET] for start in range(0, len(data), _PACKET)] or [b""]
-        packets = [kind + _MORE + part for part in parts[:-1]] + [kind + _LAST + parts[-1]]
-        if not self._push(packets[0]):
+        """Send a message's first packet; the others follow as there is room."""
+        starts = range(0, max(len(data), 1), _PACKET)
+        ends = [_MORE] * (len(starts) - 1) + [_LAST]
+        if not self._push(kind + ends[0] + data[:_PACKET]):
             return False
-        while (packets := packets[1:]) and self._push(packets[0]):
-            pass
-        self._begun.extend(packets)
+        rest = zip(starts[1:], ends[1:], strict=True)
+        self._begun.extend(kind + end + data[start : start + _PACKET] for start, end in rest)
         return True
 
     def _push(self, packet: bytes) -> bool:

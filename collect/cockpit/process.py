@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from handrail.collect.cockpit.pipe import LOST, NOTE, SETTINGS, Pipe
+from handrail.collect.cockpit.pipe import LOST, NOTE, Pipe
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
@@ -32,9 +32,9 @@ class ServerProcess:
         say: is told when it dies.
 
     Attributes:
-        process: it.
+        process: of the server that runs now.
         pipe: to it.
-        unread: what it has passed on, and nobody has obeyed yet.
+        unread: messages that it has passed on, and nobody has obeyed yet.
         address: of the page; with the token after `#` where one is asked for.
     """
 
@@ -44,9 +44,10 @@ class ServerProcess:
         self._settings = asdict(config) | {"folder": self._folder.name, "secret": secrets.token_urlsafe(32)}
         self._say, self._deaths = say, deque[float](maxlen=MOST_DEATHS)
         self.unread: list[tuple[bytes, bytes]] = []
+        self.address = ""
         self._start()
         try:
-            self.address = self._wait()
+            self._wait()
         except BaseException:
             self.close()
             raise
@@ -57,19 +58,20 @@ class ServerProcess:
         if not path.exists():
             path.write_bytes(data)
 
+    def drop(self, name: str) -> None:
+        """Take a file away from the server."""
+        (Path(self._folder.name) / name).unlink(missing_ok=True)
+
     def send(self, kind: bytes, data: bytes) -> bool:
         """Send a message if there is room for it, and a server; return whether there was."""
-        try:
+        with suppress(HandrailError):  # `receive` finds out
             return self.pipe.send(kind, data)
-        except HandrailError:
-            return False  # `receive` finds out
+        return False
 
     def send_surely(self, kind: bytes, data: bytes, instead_of: Collection[bytes] = ()) -> None:
         """Send a message, later if there is no room now; a server that has died hears it no more."""
-        try:
+        with suppress(HandrailError):
             self.pipe.send_surely(kind, data, instead_of)
-        except HandrailError:
-            return
 
     def receive(self) -> list[tuple[bytes, bytes]]:
         """Return what the server has passed on: `LOST` when it died, `NOTE` when another one has begun."""
@@ -85,10 +87,6 @@ class ServerProcess:
                 self._take(data)
         return messages
 
-    def drop(self, name: str) -> None:
-        """Take a file away from the server."""
-        (Path(self._folder.name) / name).unlink(missing_ok=True)
-
     def close(self) -> None:
         """Let the server have what waits for it, and end it: it tells its pages, then goes by itself."""
         until = time.monotonic() + _LAST_WORDS
@@ -96,30 +94,28 @@ class ServerProcess:
             while not self.pipe.flush() and time.monotonic() < until:
                 time.sleep(0.01)
         self.pipe.close()
-        try:
-            self.process.wait(_END)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
+        self._end(_END)
         self._folder.cleanup()
 
     def _start(self) -> None:
         ours, theirs = Pipe.pair()
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "handrail.collect.cockpit.server", str(theirs.fileno())],
-            pass_fds=[theirs.fileno()],
-            start_new_session=True,  # Ctrl-C ends the recording, which ends the server
-            stdin=subprocess.DEVNULL,
-        )
-        theirs.close()
+        with theirs:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "handrail.collect.cockpit.server", str(theirs.fileno())],
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,  # Ctrl-C ends the recording, which ends the server
+                stdin=subprocess.PIPE,
+            )
         self.pipe = Pipe(ours)
-        self.pipe.send_surely(SETTINGS, json.dumps(self._settings).encode())
+        assert self.process.stdin
+        with suppress(BrokenPipeError), self.process.stdin as settings:
+            settings.write(json.dumps(self._settings).encode())
 
     def _start_again(self) -> None:
         """Start another server instead of one that has died."""
         self.pipe.close()
-        how = self._ended()
-        now = time.monotonic()
+        code, now = self._end(0.1), time.monotonic()
+        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         if len(self._deaths) == MOST_DEATHS and now < self._deaths[0] + _WITHIN:
             raise HandrailError(
                 f"cockpit: the web server ended {MOST_DEATHS + 1} times within {_WITHIN:.0f} s, "
@@ -129,31 +125,29 @@ class ServerProcess:
         self._say(f"The page's web server ended ({how}). The robot brakes; a new server starts.")
         self._start()
 
-    def _ended(self) -> str:
-        """Return how the server ended."""
+    def _end(self, patience: float) -> int:
+        """Wait for the server's end, then kill it; return its exit code."""
         try:
-            code = self.process.wait(0.1)
+            return self.process.wait(patience)
         except subprocess.TimeoutExpired:
             self.process.kill()
-            code = self.process.wait()
-        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+            return self.process.wait()
 
     def _take(self, note: bytes) -> None:
         """Take where the server listens."""
         said = json.loads(note)
         if "error" in said:
             raise HandrailError(said["error"])
-        before, self.address = getattr(self, "address", said["address"]), str(said["address"])
-        self._settings["port"] = said["port"]
-        if self.address != before:
-            self._say(f"Drive at {self.address}")
+        if self.address and self.address != said["address"]:
+            self._say(f"Drive at {said['address']}")
+        self.address, self._settings["port"] = said["address"], said["port"]
 
-    def _wait(self) -> str:
+    def _wait(self) -> None:
         until = time.monotonic() + _BEGIN
-        while time.monotonic() < until:
+        while not self.address:
+            if time.monotonic() > until:
+                raise HandrailError(f"cockpit: the web server did not start within {_BEGIN:.0f} s")
+            time.sleep(0.02)
             for kind, data in self.pipe.receive():
                 if kind == NOTE:
                     self._take(data)
-                    return self.address
-            time.sleep(0.02)
-        raise HandrailError(f"cockpit: the web server did not start within {_BEGIN:.0f} s")

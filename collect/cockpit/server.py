@@ -1,4 +1,4 @@
-"""The web server of the cockpit, a process of its own: it gets a pipe to the recording, and settings there.
+"""The web server of the cockpit, a process of its own: settings come in by stdin, all else by a pipe.
 
 Its one socket to pages is `/drive`; everything else is files.
 """
@@ -9,7 +9,6 @@ import gc
 import itertools
 import json
 import os
-import select
 import shutil
 import socket
 import sys
@@ -25,12 +24,11 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from handrail.collect.cockpit.certificate import certificate
 from handrail.collect.cockpit.guard import COOKIE, Guard
 from handrail.collect.cockpit.http import Http
 from handrail.collect.cockpit.hub import Hub
 from handrail.collect.cockpit.messages import LARGEST
-from handrail.collect.cockpit.pipe import NOTE, SETTINGS, Pipe
+from handrail.collect.cockpit.pipe import NOTE, Pipe
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
@@ -81,49 +79,44 @@ class Site:
     async def _file(self, request: Request) -> Response:
         name = request.path_params["name"] or "index.html"
         if not self._guard.is_ours(request.headers) or not (name in _DOOR or self._admits(request)):
-            return _refused()
+            return _answer("not for you", 403)
         if name not in self._files:
-            return Response("not found", 404, headers=_HEADERS)
+            return _answer("not found", 404)
         return FileResponse(self._files[name], headers=_HEADERS)
 
     async def _kept(self, request: Request) -> Response:
         files = {path.name: path for path in self._folder.iterdir()}
         name = request.path_params["name"]
         if not self._admits(request) or name not in files:
-            return _refused()
+            return _answer("not for you", 403)
         return FileResponse(files[name], headers=_HEADERS | {"Cache-Control": "max-age=86400, immutable"})
 
     async def _log_in(self, request: Request) -> Response:
         if not self._guard.is_ours(request.headers, origin=True):
-            return _refused()
-        session = self._guard.log_in(await _short_body(request), _address(request))
-        if not session:
-            return await self._refused_slowly(_address(request))
-        answer = JSONResponse({}, headers=_HEADERS)
-        answer.set_cookie(
-            COOKIE, session, httponly=True, samesite="strict", secure=request.url.scheme == "https"
-        )
-        return answer
-
-    async def _refused_slowly(self, address: str) -> Response:
-        """Let whoever guesses wait; of too many at once nobody."""
-        if self._guard.guesses(address):
+            return _answer("not for you", 403)
+        address = _address(request)
+        if session := self._guard.log_in(await _short_body(request), address):
+            answer = JSONResponse({}, headers=_HEADERS)
+            secure = request.url.scheme == "https"
+            answer.set_cookie(COOKIE, session, httponly=True, samesite="strict", secure=secure)
+            return answer
+        if self._guard.guesses(address):  # whoever guesses waits; of too many at once nobody
             if self._pauses >= _MOST_PAUSES:
-                return Response("too many wrong tokens", 429, headers=_HEADERS)
+                return _answer("too many wrong tokens", 429)
             self._pauses += 1
             try:
                 await asyncio.sleep(_PAUSE)
             finally:
                 self._pauses -= 1
-        return _refused()
+        return _answer("not for you", 403)
 
     async def _drive(self, page: WebSocket) -> None:
         name = page.query_params.get("page", "")
         fine = self._guard.is_ours(page.headers, origin=True) and self._admits(page)
-        if not fine or not 8 <= len(name) <= 40:
+        if fine and 8 <= len(name) <= 40:
+            await self._hub.serve(page, name)
+        else:
             await page.close(1008)
-            return
-        await self._hub.serve(page, name)
 
     def _admits(self, request: Request | WebSocket) -> bool:
         return self._guard.admits(request.headers, request.cookies, _address(request))
@@ -146,32 +139,25 @@ def _address(request: Request | WebSocket) -> str:
     return request.client.host if request.client else ""
 
 
-def _refused() -> Response:
-    return Response("not for you", 403, headers=_HEADERS)
+def _answer(words: str, status: int) -> Response:
+    return Response(words, status, headers=_HEADERS)
 
 
 def _listening(host: str, port: int) -> socket.socket:
     """Return a socket that listens at a port, or one of the next ones."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    trouble: OSError | None = None
+    place, trouble = "127.0.0.1" if host == "localhost" else host, ""
     for trial in range(port, port + _TRIES if port else 1):
-        listener = socket.socket(family, socket.SOCK_STREAM)
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listener.bind(("127.0.0.1" if host == "localhost" else host, trial))
-            listener.listen(64)
+            dual = family == socket.AF_INET6 and socket.has_dualstack_ipv6()  # `::` takes IPv4, too
+            return socket.create_server((place, trial), family=family, backlog=64, dualstack_ipv6=dual)
         except OSError as error:
-            trouble = error
-            listener.close()
-            continue
-        return listener
-    raise HandrailError(f"cockpit: cannot listen at {host}, port {port}: {trouble and trouble.strerror}")
+            trouble = error.strerror
+    raise HandrailError(f"cockpit: cannot listen at {host}, port {port}: {trouble}")
 
 
-async def serve(pipe: Pipe, settings: dict[str, Any]) -> None:
+async def serve(pipe: Pipe, config: CockpitConfig, folder: Path, secret: str) -> None:
     """Serve until the recording is gone."""
-    folder, secret = Path(settings.pop("folder")), settings.pop("secret")
-    config = CockpitConfig(**settings)
     listener = _listening(config.host, config.port)
     scheme = "http" if config.is_private else "https"
     guard, hub = Guard(not config.asks, scheme, secret), Hub(pipe)
@@ -179,12 +165,20 @@ async def serve(pipe: Pipe, settings: dict[str, Any]) -> None:
     host, port = listener.getsockname()[:2]
     door = f"#{guard.token}" if config.asks else ""
     shown = f"[{host}]" if ":" in host else host
-    pipe.send_surely(
-        NOTE, json.dumps({"address": f"{scheme}://{shown}:{port}/{door}", "port": port}).encode()
-    )
-    gone = asyncio.Event()
-    asyncio.get_running_loop().add_reader(pipe.fileno(), _noticing(gone, pipe, hub.hear))
-    beside = [asyncio.create_task(task) for task in (_note(gone, pipe, hub, guard), _end(server, gone, hub))]
+    note = {"address": f"{scheme}://{shown}:{port}/{door}", "port": port}
+    pipe.send_surely(NOTE, json.dumps(note).encode())
+    gone, loop = asyncio.Event(), asyncio.get_running_loop()
+
+    def noticing(act: Callable[[], None]) -> None:
+        """Act, and notice when the recording is gone."""
+        try:
+            act()
+        except HandrailError:
+            gone.set()
+            loop.remove_reader(pipe.fileno())
+
+    loop.add_reader(pipe.fileno(), noticing, hub.hear)
+    beside = [asyncio.create_task(task) for task in (_note(noticing, hub, guard), _end(server, gone, hub))]
     await server.serve(sockets=[listener])
     for task in beside:
         task.cancel()
@@ -207,17 +201,14 @@ def _uvicorn(site: Site, config: CockpitConfig) -> uvicorn.Config:
     )
 
 
-def _noticing(gone: asyncio.Event, pipe: Pipe, act: Callable[[], None]) -> Callable[[], None]:
-    """Return what acts, and notices when the recording is gone."""
+def _certificate(config: CockpitConfig) -> tuple[Path, Path]:
+    from handrail.collect.cockpit.certificate import certificate
 
-    def acting() -> None:
-        try:
-            act()
-        except HandrailError:
-            gone.set()
-            asyncio.get_running_loop().remove_reader(pipe.fileno())
-
-    return acting
+    if config.certificate:
+        folder = Path(config.certificate).expanduser()
+        return folder / "cert.pem", folder / "key.pem"
+    place = Path(os.environ.get("XDG_CONFIG_HOME", "~/.config")).expanduser() / "handrail" / "cockpit"
+    return certificate(config.host, place)
 
 
 async def _end(server: uvicorn.Server, gone: asyncio.Event, hub: Hub) -> None:
@@ -229,7 +220,7 @@ async def _end(server: uvicorn.Server, gone: asyncio.Event, hub: Hub) -> None:
     server.should_exit = True
 
 
-async def _note(gone: asyncio.Event, pipe: Pipe, hub: Hub, guard: Guard) -> None:
+async def _note(noticing: Callable[[Callable[[], None]], None], hub: Hub, guard: Guard) -> None:
     """Look again and again how late the loop is; send what waits for the recording; give memory back.
 
     A TLS connection that is gone is 256 KiB of garbage in a cycle: too few objects for Python to look soon.
@@ -238,20 +229,12 @@ async def _note(gone: asyncio.Event, pipe: Pipe, hub: Hub, guard: Guard) -> None
     for turn in itertools.count(1):
         before = time.monotonic()
         await asyncio.sleep(_NOTES)
-        hub.note_lag(time.monotonic() - before - _NOTES)
-        _noticing(gone, pipe, hub.keep_up)()
+        hub.strain.note(time.monotonic() - before - _NOTES)
+        noticing(hub.keep_up)
         if turn % _REPORTS == 0:
-            _noticing(gone, pipe, lambda: hub.report(guard.refused))()
+            noticing(lambda: hub.report(guard.refused))
         if turn % _COLLECTIONS == 0:
             gc.collect()
-
-
-def _certificate(config: CockpitConfig) -> tuple[Path, Path]:
-    if config.certificate:
-        folder = Path(config.certificate).expanduser()
-        return folder / "cert.pem", folder / "key.pem"
-    place = Path(os.environ.get("XDG_CONFIG_HOME", "~/.config")).expanduser() / "handrail" / "cockpit"
-    return certificate(config.host, place)
 
 
 def main() -> None:
@@ -260,9 +243,11 @@ def main() -> None:
     with contextlib.suppress(AttributeError, OSError):
         os.setpriority(os.PRIO_PROCESS, 0, _NICE)
     try:
-        settings = _settings(pipe)
-        folder = settings["folder"]
-        asyncio.run(serve(pipe, settings))
+        if not (said := sys.stdin.read()):
+            return  # the recording is gone already
+        settings: dict[str, Any] = json.loads(said)
+        folder, secret = settings.pop("folder"), settings.pop("secret")
+        asyncio.run(serve(pipe, CockpitConfig(**settings), Path(folder), secret))
         with contextlib.suppress(HandrailError):
             pipe.receive()
             return  # the recording is still there
@@ -270,15 +255,6 @@ def main() -> None:
     except HandrailError as error:
         with contextlib.suppress(HandrailError):
             pipe.send_surely(NOTE, json.dumps({"error": str(error)}).encode())
-
-
-def _settings(pipe: Pipe) -> dict[str, Any]:
-    """Return what the recording says first."""
-    select.select([pipe], [], [], _PATIENCE)
-    for kind, data in pipe.receive():
-        if kind == SETTINGS:
-            return json.loads(data)
-    raise HandrailError("cockpit: the web server got no settings")
 
 
 if __name__ == "__main__":

@@ -1,33 +1,24 @@
 """What the page shows of a moment: one small value, many times a second."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from handrail.collect.cockpit import stage
-from handrail.collect.cockpit.lead import Lead, Leads
+from handrail.collect.cockpit.lead import base_ahead, hand_ahead
+from handrail.collect.cockpit.nearest import NearestPair
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
-from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
-from handrail.collect.world.geometry import ROBOT_BIT
-from handrail.collect.world.gl import MjData, MjModel, mujoco
 from handrail.collect.world.task import Aimed, TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Status
-from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.description import RobotDescription
 from handrail.controllers.robot.model import Pose
 from handrail.datasets.recording.frames import Frame
-
-_PATH_STEPS = 8  # of a plan that is drawn
-
-
-_FAR = 0.5  # farther is not looked for [m]
-
 
 STATUS: Mapping[Status, str] = {
     Status.OK: "",
@@ -39,6 +30,7 @@ STATUS: Mapping[Status, str] = {
     Status.SOLVER_FAILED: "braking: no plan was found",
     Status.BACKUP: "braking: no safe way on",
 }
+_PATH_STEPS = 8  # of a plan that is drawn
 _CLOSE = 0.02  # to a limit [rad, m]
 _MOST = 2  # contacts, and joints, that are named
 
@@ -50,117 +42,23 @@ def reason(status: Status, contacts: Iterable[str], q: FloatArray, robot: RobotD
         status: of the controller.
         contacts: forbidden ones, as pairs of names.
         q: of the robot, (n,) [m, rad].
-        robot: it.
+        robot: its description.
     """
-    touching = [f"touching: {_plain(pair)}" for pair in list(contacts)[:_MOST]]
-    return " · ".join(filter(None, [STATUS[status], *touching, *_at_limits(q, robot)[:_MOST]]))
-
-
-def _at_limits(q: FloatArray, robot: RobotDescription) -> list[str]:
     limits, base = robot.limits, len(robot.base.joints)
     at = np.flatnonzero((q < limits.position_lower + _CLOSE) | (q > limits.position_upper - _CLOSE))
-    names = [_plain(robot.joints[index].removesuffix("_joint")) for index in at if index >= base]
-    edge = ["base at the edge of its area"] if np.any(at < base) else []
-    return edge + [f"joint {name} at its limit" for name in names]
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")
-
-
-@dataclass(frozen=True)
-class Nearest:
-    """Two points, one on each, (2, 3), how far apart their surfaces are [m], and of what they are."""
-
-    points: tuple[float, ...]
-    distance: float
-    names: tuple[str, str]
-
-
-class NearestPair:
-    """Measures the robot against itself and what stands around; what it may carry or pull is left out.
-
-    Args:
-        model: the compiled model.
-    """
-
-    def __init__(self, model: MjModel) -> None:
-        self._model = model
-        robot = [g for g in range(model.ngeom) if model.geom_contype[g] & ROBOT_BIT]
-        solid = np.flatnonzero((model.geom_contype | model.geom_conaffinity) > 0).tolist()
-        scene = [g for g in solid if g not in robot and model.geom_bodyid[g] and self._is_apart(g, robot)]
-        own = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
-        pairs = [*own, *((first, second) for first in robot for second in scene)]
-        self._first, self._second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-        self._radii = model.geom_rbound[self._first] + model.geom_rbound[self._second]
-
-    def _is_apart(self, geom: int, robot: list[int]) -> bool:
-        """Whether a geom is no part of the robot, as a finger is, and nothing that can be moved."""
-        if self._model.body_dofnum[self._model.geom_bodyid[geom]]:
-            return False
-        bodies = {int(self._model.body_rootid[self._model.geom_bodyid[each]]) for each in robot}
-        return int(self._model.body_rootid[self._model.geom_bodyid[geom]]) not in bodies
-
-    def find(self, data: MjData) -> Nearest | None:
-        """Return the nearest pair now; None where nothing is near.
-
-        Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer.
-        """
-        between = data.geom_xpos[self._first] - data.geom_xpos[self._second]
-        bounds = np.sqrt(np.einsum("ij,ij->i", between, between)) - self._radii
-        best, line, found = _FAR, np.zeros(6), None
-        for index in np.argsort(bounds).tolist():
-            if bounds[index] >= best:
-                break
-            first, second = int(self._first[index]), int(self._second[index])
-            distance = mujoco.mj_geomDistance(self._model, data, first, second, best, line)
-            if distance < best:
-                best, found = distance, (first, second, tuple(np.round(line, 3).tolist()))
-        if found is None:
-            return None
-        first, second, points = found
-        return Nearest(points, round(best, 4), (self._name(first), self._name(second)))
-
-    def _name(self, geom: int) -> str:
-        name = self._model.geom(geom).name or self._model.body(self._model.geom_bodyid[geom]).name
-        return name.replace("_", " ")
-
-
-@dataclass
-class Counts:
-    """What has been recorded in this run."""
-
-    saved: int = 0
-    succeeded: int = 0
-    episodes: list[dict[str, Any]] = field(default_factory=list)
-
-    def add(self, outcome: Outcome, played: str = "") -> None:
-        """Count an episode.
-
-        Args:
-            outcome: of it.
-            played: the file of its poses, if it was kept.
-        """
-        self.saved += outcome.kept
-        self.succeeded += outcome.kept and outcome.success
-        words = "success" if outcome.success else outcome.failure_reason or str(outcome.ended_by)
-        words += "; you said done" if outcome.operator_says == "success" and not outcome.success else ""
-        words = f"practice: {words}" if outcome.practice else words
-        said = {"kept": outcome.kept, "success": outcome.success, "said": words, "seconds": outcome.seconds}
-        self.episodes.append(said | {"played": played})
+    joints = ["base at the edge of its area"] if np.any(at < base) else []
+    joints += [f"joint {robot.joints[n].removesuffix('_joint')} at its limit" for n in at if n >= base]
+    touching = [f"touching: {pair}" for pair in list(contacts)[:_MOST]]
+    found = [each.replace("_", " ") for each in (*touching, *joints[:_MOST])]
+    return " · ".join(filter(None, [STATUS[status], *found]))
 
 
 class Snapshots:
-    """Puts together what the page shows.
-
-    Args:
-        env: in which an episode has begun.
-    """
+    """Puts together what the page shows of an environment in which an episode has begun."""
 
     def __init__(self, env: HandrailEnv) -> None:
         self._env, self._model = env, env.model
         self._nearest = NearestPair(env.simulation.mujoco_model)
-        self._leads = Leads(env.model)
         self._frame: Frame | None = None
         self._undo_to = 0.0  # the moment that an undo goes back to [s]
 
@@ -176,21 +74,20 @@ class Snapshots:
             person: whoever steers.
             stamp: of the clock of inputs [s].
         """
-        frame, setting = self._frame, person.setting
-        mask = person.meaning.mask(setting)
-        if person.phase is not Phase.DRIVING and not np.any(view.state.commanded):
-            self._undo_to = view.state.time
+        setting, env, state = person.setting, self._env, view.state
+        if person.phase is not Phase.DRIVING and not np.any(state.commanded):
+            self._undo_to = state.time
+        nearest = self._nearest.find(env.simulation.data)
         return {
             "stamp": round(stamp, 4),
-            "time": round(view.state.time, 3),
+            "time": round(state.time, 3),
             "practice": person.practises,
-            "undos": frame.undos if frame else 0,
             "aim": self._aim(view.task),
-            "judge": None if self._env.real else self._env.task.outcome(view.task).success,
-            "undo_takes": round(view.state.time - self._undo_to, 1),
-            "left": round(self._env.task.horizon - view.state.time, 1),
+            "judge": None if env.real else env.task.outcome(view.task).success,
+            "undo_takes": round(state.time - self._undo_to, 1),
+            "left": round(env.task.horizon - state.time, 1),
             "phase": person.phase.value,
-            "poses": stage.poses(self._env.simulation.data),
+            "poses": stage.poses(env.simulation.data),
             "tool": _numbers(view.tool),
             "opening": round(view.task.opening, 2),
             "mode": setting.mode.name,
@@ -198,14 +95,11 @@ class Snapshots:
             "frame": setting.frame,
             "speed": setting.speed,
             "locked": setting.locked,
-            "mask": np.flatnonzero(mask).tolist(),
-            "status": frame.diagnostics.status.value if frame else "ok",
-            "reason": self._reason(frame, view.state.q),
-            "nearest": self._nearest_pair(),
-            "q": np.round(view.state.q, 3).tolist(),
-            "v": np.round(view.state.commanded, 3).tolist(),
-            **self._ghosts(view, frame),
-            **self._plan(frame, view.state.q),
+            "mask": np.flatnonzero(person.meaning.mask(setting)).tolist(),
+            "nearest": asdict(nearest) if nearest else None,
+            "q": np.round(state.q, 3).tolist(),
+            "v": np.round(state.commanded, 3).tolist(),
+            **self._controlled(view),
             "age": round(min(person.age, 99.0), 3),
             "round_trip": round(person.round_trip, 4),
         }
@@ -219,35 +113,31 @@ class Snapshots:
         pose = np.round(np.concatenate([aim.position, turn]), 4).tolist()
         return {"name": aim.name, "pose": pose, "distance": aim.distance, "angle": round(aim.angle, 4)}
 
-    def _reason(self, frame: Frame | None, q: FloatArray) -> str:
+    def _controlled(self, view: View) -> dict[str, Any]:
+        """Return how the controller fares, and where intent and plan lead.
+
+        The ghosts are the hand's pose, (7,), and the base's x, y, yaw, empty at rest; the plan is the path of
+        the hand, (k, 3), and the track of the base's x, y, yaw, (k, 3) [m, rad].
+        """
+        frame, model, q = self._frame, self._model, view.state.q
+        shown: dict[str, Any] = {"undos": 0, "status": "ok", "reason": ""}
+        shown |= {"ghost": [], "ghost_base": [], "path": [], "track": []}
         if frame is None:
-            return ""
-        return reason(frame.diagnostics.status, self._env.world.contacts, q, self._model.description)
-
-    def _nearest_pair(self) -> dict[str, Any] | None:
-        found = self._nearest.find(self._env.simulation.data)
-        return asdict(found) if found else None
-
-    def _ghosts(self, view: View, frame: Frame | None) -> dict[str, list[float]]:
-        """Return where the intent leads: the hand's pose, (7,), and the base's x, y, yaw; empty at rest."""
-        lead = self._leads.find(frame.intent, view.tool, view.state.q) if frame else Lead()
-        return {
-            "ghost": _numbers(lead.hand) if lead.hand else [],
-            "ghost_base": [] if lead.base is None else np.round(lead.base, 3).tolist(),
-        }
-
-    def _plan(self, frame: Frame | None, q: FloatArray) -> dict[str, list[list[float]]]:
-        """Return where the plan leads: the hand, (k, 3), and the base's x, y, yaw, (k, 3) [m, rad]."""
-        plan: Trajectory | None = frame.plan if frame else None
-        if plan is None:
-            return {"path": [], "track": []}
-        path, _ = plan.path(q)
-        chosen = path[:: max(1, len(path) // _PATH_STEPS)]
-        base = len(self._model.description.base.joints)
-        return {
-            "path": [np.round(self._model.pose(each).position, 3).tolist() for each in chosen],
-            "track": np.round(chosen[:, :base], 3).tolist() if base else [],
-        }
+            return shown
+        status = frame.diagnostics.status
+        shown["undos"], shown["status"] = frame.undos, status.value
+        shown["reason"] = reason(status, self._env.world.contacts, q, model.description)
+        if hand := hand_ahead(model, frame.intent, view.tool, q):
+            shown["ghost"] = _numbers(hand)
+        if (base := base_ahead(model, frame.intent, q)) is not None:
+            shown["ghost_base"] = np.round(base, 3).tolist()
+        if frame.plan is not None:
+            path, _ = frame.plan.path(q)
+            chosen = path[:: max(1, len(path) // _PATH_STEPS)]
+            shown["path"] = [np.round(model.pose(each).position, 3).tolist() for each in chosen]
+            joints = len(model.description.base.joints)
+            shown["track"] = np.round(chosen[:, :joints], 3).tolist() if joints else []
+        return shown
 
 
 def _numbers(pose: Pose) -> list[float]:

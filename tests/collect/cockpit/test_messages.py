@@ -28,7 +28,10 @@ def said(**changes):
 
 
 def test_a_drive_and_an_ask():
-    assert parse(said()) == Drive(3, 1.5, Input(True, "keyboard", False, (0.0, 1.0), 0.3, (3.0,)))
+    drive = parse(said())
+    assert isinstance(drive, Drive)
+    assert (drive.seq, drive.echo) == (3, 1.5)
+    assert drive.inputs == Input(True, "keyboard", False, (0.0, 1.0), 0.3, (3.0,))
     assert parse('{"kind": "ask", "what": "mode", "value": "ee"}') == Ask("mode", "ee")
     assert parse('{"kind": "ask", "what": "lock", "value": [1, 2]}') == Ask("lock", (1, 2))
 
@@ -44,7 +47,8 @@ def test_a_drive_and_an_ask():
         said(axes=[float("nan")]), said(axes=[2.0]), said(axes=["1"]), said(axes=[True]), said(axes=[0] * 65),
         said(axes={}), said(seq=-1), said(seq=1.0), said(seq=True), said(seq=2**60), said(echo=-1),
         said(on=1), said(device="mouse"), said(device=[]), said(view=1e9), said(grip=None), said(extra=1),
-        said(targets=[100.0]), said(targets=None),
+        said(targets=[100.0]), said(targets=None), said(device="\ud800"), said(echo=10**400),
+        said(axes=[10**400]), said(view="\ud800"),
         " " * (LARGEST + 1),
     ],
 )  # fmt: skip

@@ -10,8 +10,9 @@ import pytest
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.disk import DiskWatch
-from handrail.collect.cockpit.lead import AHEAD, Leads
-from handrail.collect.cockpit.snapshot import STATUS, NearestPair, Snapshots, reason
+from handrail.collect.cockpit.lead import AHEAD, base_ahead, hand_ahead
+from handrail.collect.cockpit.nearest import NearestPair
+from handrail.collect.cockpit.snapshot import STATUS, Snapshots, reason
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
@@ -98,39 +99,40 @@ def test_contacts_and_joints_at_their_limits_are_named(env):
     assert env.model.joints[elbow].removesuffix("_joint").replace("_", " ") + " at its limit" in words
 
 
+def ahead(env, intent, q=None):
+    """Return the hand's pose and the base's to which an intent leads."""
+    now = view(env)
+    q = now.state.q if q is None else q
+    return hand_ahead(env.model, intent, now.tool, q), base_ahead(env.model, intent, q)
+
+
 def test_the_hand_leads_where_it_is_asked_to_go_and_turn(env):
-    leads, now = Leads(env.model), view(env)
-    lead = leads.find(asked(env, ee__vz=0.2, ee__wz=0.5), now.tool, now.state.q)
-    assert lead.base is None
-    np.testing.assert_allclose(lead.hand.position - now.tool.position, [0, 0, 0.2 * AHEAD])
-    turn = rotation_vector(lead.hand.rotation @ now.tool.rotation.T)
+    tool = view(env).tool
+    hand, base = ahead(env, asked(env, ee__vz=0.2, ee__wz=0.5))
+    assert base is None
+    np.testing.assert_allclose(hand.position - tool.position, [0, 0, 0.2 * AHEAD])
+    turn = rotation_vector(hand.rotation @ tool.rotation.T)
     np.testing.assert_allclose(turn, [0, 0, 0.5 * AHEAD], atol=1e-9)
-    own = leads.find(asked(env, Frames(tool="tool"), ee__vz=0.2), now.tool, now.state.q)
-    np.testing.assert_allclose(
-        own.hand.position, now.tool.position + 0.2 * AHEAD * now.tool.rotation[:, 2], atol=1e-12
-    )
+    own, _ = ahead(env, asked(env, Frames(tool="tool"), ee__vz=0.2))
+    along = tool.position + 0.2 * AHEAD * tool.rotation[:, 2]
+    np.testing.assert_allclose(own.position, along, atol=1e-12)
 
 
 def test_joints_lead_the_hand_and_a_base_leads_as_it_is_turned(env):
-    leads, now = Leads(env.model), view(env)
-    joint = f"joint__{env.model.joints[-1]}"
-    q = np.array(now.state.q)
+    q = np.array(view(env).state.q)
     q[-1] += 0.5 * AHEAD
-    lead = leads.find(asked(env, **{joint: 0.5}), now.tool, now.state.q)
-    np.testing.assert_allclose(lead.hand.rotation, env.model.pose(q).rotation, atol=1e-12)
-    turned = np.array(now.state.q)
+    hand, _ = ahead(env, asked(env, **{f"joint__{env.model.joints[-1]}": 0.5}))
+    np.testing.assert_allclose(hand.rotation, env.model.pose(q).rotation, atol=1e-12)
+    turned = np.array(view(env).state.q)
     turned[2] = math.pi / 2
-    lead = leads.find(asked(env, base__vx=0.5), now.tool, turned)
-    assert lead.hand is None
-    assert lead.base is not None
-    np.testing.assert_allclose(lead.base - turned[:3], [0, 0.5 * AHEAD, 0], atol=1e-12)
+    hand, base = ahead(env, asked(env, base__vx=0.5), turned)
+    assert hand is None
+    assert base is not None
+    np.testing.assert_allclose(base - turned[:3], [0, 0.5 * AHEAD, 0], atol=1e-12)
 
 
 def test_at_rest_nothing_leads_anywhere(env):
-    now = view(env)
-    lead = Leads(env.model).find(asked(env, ee__vx=0.0, base__vx=0.0), now.tool, now.state.q)
-    assert lead.hand is None
-    assert lead.base is None
+    assert ahead(env, asked(env, ee__vx=0.0, base__vx=0.0)) == (None, None)
 
 
 def test_the_nearest_pair_is_the_nearest_of_all(env):

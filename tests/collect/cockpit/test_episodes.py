@@ -1,15 +1,18 @@
 """Laws of the poses that are kept of an episode: what a page plays is what was; old ones make room."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from cockpit_helpers import ask, server
 
 from handrail.collect.cockpit import stage
-from handrail.collect.cockpit.played import EpisodePoses, PlayedFiles
+from handrail.collect.cockpit.episodes import EpisodeList, EpisodePoses
 from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env
+from handrail.collect.session.outcome import Tally
 
 
 @pytest.fixture
@@ -62,16 +65,34 @@ def test_what_was_undone_is_not_played(env):
     assert not any(np.array_equal(row, gone[number]) for row in rows for number in range(6, 12))
 
 
+def outcome(ended_by=None):
+    done = {"is_success": True, "failure_reason": ""}
+    return Tally(0, 0.05).outcome(done, ended_by)
+
+
 def test_old_ones_make_room():
-    files = {}
-    played = PlayedFiles(files.__setitem__, files.__delitem__)
-    names = [played.add(bytes([number]) * 100) for number in range(60)]
+    files, poses = {}, SimpleNamespace()
+    listed = EpisodeList(SimpleNamespace(keep=files.__setitem__, drop=files.__delitem__))
+
+    def add(number, size):
+        poses.file = lambda: bytes([number]) * size
+        listed.add(outcome(), poses)
+        return listed.described()[-1]["played"]
+
+    names = [add(number, 100) for number in range(60)]
     assert len(set(names)) == 60
     assert list(files) == names[-50:]
-    assert names[-1] in played
-    assert names[0] not in played
-    large = [played.add(bytes([number]) * (30 * 2**20)) for number in range(4)]
+    assert [each["played"] for each in listed.described()] == [""] * 10 + names[-50:]
+    large = [add(number, 30 * 2**20) for number in range(4)]
     assert list(files) == large[-2:]
+
+
+def test_what_is_thrown_away_is_told_and_not_kept():
+    files = {}
+    listed = EpisodeList(SimpleNamespace(keep=files.__setitem__, drop=files.__delitem__))
+    listed.add(outcome(EpisodeEvent.DISCARD), None)
+    assert (listed.saved, listed.succeeded, files) == (0, 0, {})
+    assert [each["kept"] for each in listed.described()] == [False]
 
 
 def test_pages_get_them_as_they_get_meshes():
