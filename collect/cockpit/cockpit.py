@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image
 
 from handrail.collect.cockpit import stage
-from handrail.collect.cockpit.disk import DiskWatch
+from handrail.collect.cockpit.disk import DiskRoom
 from handrail.collect.cockpit.episodes import EpisodeList, EpisodePoses
 from handrail.collect.cockpit.pipe import (
     ASK,
@@ -86,7 +86,7 @@ class Cockpit:
         self._model, self._server, self._say = model, server, say
         self._refuses, self._folder, self._wanted, self._next = refuses, folder, wanted, next
         self._episodes, self._person = EpisodeList(server), Person(model, modes, first)
-        self._disk = DiskWatch(Path(folder).absolute()) if folder else None
+        self._disk = DiskRoom(Path(folder).absolute()) if folder else None
         self._strain = Strain()
         Image.preinit()  # else the first picture of an episode waits for that
         self._dropped: dict[str, int] = {}
@@ -150,7 +150,7 @@ class Cockpit:
         """Count an episode; keep its poses, if it is kept."""
         self._episodes.add(outcome, self._poses)
         if self._disk:
-            self._disk.saved(self._episodes.saved)
+            self._disk.measure(self._episodes.saved)
         self._send_stage()
 
     def close(self) -> None:
@@ -160,8 +160,6 @@ class Cockpit:
         if self._all_dropped:
             counts = ", ".join(f"{count} {why}" for why, count in self._all_dropped.items())
             self._say(f"dropped or refused by the page's server: {counts}")
-        if self._disk:
-            self._disk.close()
         saved, succeeded = self._episodes.saved, self._episodes.succeeded
         said = {"saved": saved, "succeeded": succeeded, "folder": self._folder}
         said["next"] = list(self._next) if saved else []

@@ -9,12 +9,13 @@ import hmac
 import ipaddress
 import secrets
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 
 COOKIE = "handrail_session"
 _LASTS = 12 * 3600.0  # a session [s]
 _FAILURES, _WITHIN = 5, 60.0  # wrong tokens from one address, in a time [s]
-_MOST_ADDRESSES = 64
+_MOST_FAILURES = 1000  # that are remembered, of all addresses
 
 
 class Guard:
@@ -39,7 +40,7 @@ class Guard:
     ) -> None:
         self._private, self._scheme, self._secret, self._clock = private, scheme, secret.encode(), clock
         self.token, self.refused = self._signed("token"), 0
-        self._failures: dict[str, list[float]] = {}
+        self._failures = deque[tuple[str, float]](maxlen=_MOST_FAILURES)  # addresses, and when [s]
 
     def admits(self, headers: Mapping[str, str], cookies: Mapping[str, str], address: str) -> bool:
         """Whether a request may see more than the door."""
@@ -63,9 +64,7 @@ class Guard:
         The right one is always welcome: whoever guesses cannot keep its owner out.
         """
         if not hmac.compare_digest(token.encode(), self.token.encode()):
-            self._failures[address] = [*self._recent(address), self._clock()][-_FAILURES:]
-            if len(self._failures) > _MOST_ADDRESSES:
-                self._failures.pop(next(iter(self._failures)))
+            self._failures.append((address, self._clock()))
             self.refused += 1
             return ""
         note = f"{self._clock() + _LASTS:.0f}.{secrets.token_urlsafe(12)}"
@@ -73,10 +72,8 @@ class Guard:
 
     def guesses(self, address: str) -> bool:
         """Whether an address has said so many wrong tokens of late that its next answer may take a while."""
-        return len(self._recent(address)) >= _FAILURES
-
-    def _recent(self, address: str) -> list[float]:
-        return [t for t in self._failures.get(address, []) if t > self._clock() - _WITHIN]
+        since = self._clock() - _WITHIN
+        return sum(each == address and at > since for each, at in self._failures) >= _FAILURES
 
     def _is_known(self, session: str, address: str) -> bool:
         note, _, signature = session.rpartition(".")

@@ -5,19 +5,21 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from handrail.collect.cockpit import stage
-from handrail.collect.cockpit.lead import base_ahead, hand_ahead
 from handrail.collect.cockpit.nearest import NearestPair
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.task import Aimed, TaskState
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
-from handrail.controllers.numerics.rotation import quaternion_from_matrix
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.numerics.rotation import quaternion_from_matrix, turned
 from handrail.controllers.robot.description import RobotDescription
-from handrail.controllers.robot.model import Pose
+from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.datasets.recording.frames import Frame
 
 STATUS: Mapping[Status, str] = {
@@ -30,6 +32,7 @@ STATUS: Mapping[Status, str] = {
     Status.SOLVER_FAILED: "braking: no plan was found",
     Status.BACKUP: "braking: no safe way on",
 }
+AHEAD = 0.6  # how far the ghosts of the page are ahead of the robot [s]
 _PATH_STEPS = 8  # of a plan that is drawn
 _CLOSE = 0.02  # to a limit [rad, m]
 _MOST = 2  # contacts, and joints, that are named
@@ -51,6 +54,32 @@ def reason(status: Status, contacts: Iterable[str], q: FloatArray, robot: RobotD
     touching = [f"touching: {pair}" for pair in list(contacts)[:_MOST]]
     found = [each.replace("_", " ") for each in (*touching, *joints[:_MOST])]
     return " · ".join(filter(None, [STATUS[status], *found]))
+
+
+def hand_ahead(model: RobotModel, intent: Intent, tool: Pose, q: FloatArray) -> Pose | None:
+    """Return the hand's pose within `AHEAD`, at the velocity that is asked for; None where none is."""
+    channels, asked = Channels.of(model.description), _asked(intent)
+    twist, joints = asked[channels.tool_slice], asked[channels.joint_slice]
+    if twist.any():
+        in_tool = intent.frames.tool == "tool"
+        linear, angular = (tool.rotation @ part if in_tool else part for part in (twist[:3], twist[3:]))
+        turn = Rotation.from_rotvec(AHEAD * angular).as_matrix()
+        return Pose(tool.position + AHEAD * linear, turn @ tool.rotation)
+    return model.pose(q + AHEAD * joints) if joints[len(channels.base) :].any() else None
+
+
+def base_ahead(model: RobotModel, intent: Intent, q: FloatArray) -> FloatArray | None:
+    """Return the base's x, y [m] and yaw [rad] in the world, (3,), within `AHEAD`; None likewise."""
+    channels, asked = Channels.of(model.description), _asked(intent)
+    base = slice(0, len(channels.base))
+    twist, joints = asked[channels.base_slice], asked[channels.joint_slice][base]
+    if twist.any():
+        return q[base] + AHEAD * turned(twist, q[2] + 0.5 * AHEAD * twist[2])
+    return q[base] + AHEAD * joints if joints.any() else None
+
+
+def _asked(intent: Intent) -> FloatArray:
+    return np.where(intent.mask, np.nan_to_num(intent.values), 0.0)
 
 
 class Snapshots:

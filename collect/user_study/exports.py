@@ -6,7 +6,7 @@ They are made anew from the participants' files and the datasets every time: not
 import json
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,11 @@ COLUMNS: Mapping[str, Mapping[str, str]] = tomllib.loads(
     (Path(__file__).parent / "columns.toml").read_text(encoding="utf-8")
 )
 """The columns of each table, and what they mean."""
+_SCORES: Mapping[str, tuple[Callable[..., float | None], tuple[str, ...]]] = {  # and the forms they need
+    "tlx_raw": (tlx_raw, (TLX,)),
+    "tlx_weighted": (tlx_weighted, (TLX, TLX_PAIRS)),
+    "sus": (sus_score, (SUS,)),
+}
 
 
 def export(folder: StudyFolder) -> list[Path]:
@@ -62,18 +67,12 @@ def _answers(who: Participant) -> Iterator[dict[str, Any]]:
 
 
 def _scores(who: Participant, mode: str) -> Iterator[dict[str, Any]]:
-    """Yield the scores of a condition, of the forms that are done."""
-    keys = {form: f"{mode}/{form}" for form in (TLX, TLX_PAIRS, SUS)}
-    done = {form: who.answers(key) for form, key in keys.items() if key in who.finished}
-    found: dict[str, float | None] = {}
-    if TLX in done:
-        found["tlx_raw"] = tlx_raw(done[TLX])
-    if TLX in done and TLX_PAIRS in done:
-        found["tlx_weighted"] = tlx_weighted(done[TLX], done[TLX_PAIRS])
-    if SUS in done:
-        found["sus"] = sus_score(done[SUS])
-    for name, value in found.items():
-        yield {"participant": who.name, "condition": mode, "score": name, "value": value}
+    """Yield the scores of a condition whose forms are done."""
+    for name, (score, forms) in _SCORES.items():
+        keys = [f"{mode}/{form}" for form in forms]
+        if who.finished.issuperset(keys):
+            value = score(*map(who.answers, keys))
+            yield {"participant": who.name, "condition": mode, "score": name, "value": value}
 
 
 def _trials(folder: StudyFolder, people: Sequence[Participant]) -> Iterator[dict[str, Any]]:

@@ -4,6 +4,7 @@ import contextlib
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +12,44 @@ import pyarrow.parquet as pq
 
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.reading.reader import read_episodes, read_info
+from handrail.scripts.bench.latency.measure import family
 
 _PERIOD = 0.05  # of a frame [s]
+
+
+def command(folder, *flags):
+    words = [sys.executable, "-m", "handrail.scripts", "cockpit", *([str(folder)] if folder else [])]
+    return [*words, "--cockpit.no_open", "--cockpit.port", "0", *map(str, flags)]
+
+
+class Recording:
+    """`handrail-cockpit` that goes on beside a test and says what it says to a file."""
+
+    def __init__(self, folder, *flags):
+        self.root, self.log = folder / "dataset", folder / "log"
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(command(self.root, *flags), stderr=log)
+        while "Drive at" not in self.log.read_text():
+            assert self.process.poll() is None, self.log.read_text()
+            time.sleep(0.1)
+        self.address = self.log.read_text().split("Drive at ")[1].split()[0]
+
+    @property
+    def server(self):
+        """The process of the web server."""
+        (found,) = [pid for pid, words in family(self.process.pid).items() if "cockpit.server" in words]
+        return found
+
+    def close(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+        self.process.wait(60)
 
 
 @contextlib.contextmanager
 def recording(folder, *flags, cwd=None):
     """Run `handrail-cockpit` for a folder, or with none; give its process and address."""
-    command = [sys.executable, "-m", "handrail.scripts", "cockpit", *([str(folder)] if folder else [])]
-    command += ["--cockpit.no_open", "--cockpit.port", "0", *map(str, flags)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=cwd)
+    process = subprocess.Popen(command(folder, *flags), stderr=subprocess.PIPE, text=True, cwd=cwd)
     try:
         said = []
         while "Drive at" not in (line := process.stderr.readline()):

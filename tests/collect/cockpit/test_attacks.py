@@ -5,12 +5,14 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
 
 import cockpit_attacks
 import numpy as np
 import pytest
 from cockpit_helpers import ask, drive, page
+from page_recording import Recording
 from websockets.exceptions import ConnectionClosed
 
 from handrail.datasets.reading.reader import read_episodes, read_frames
@@ -73,37 +75,20 @@ class Owner:
         self._thread.join()
 
 
-class Recording:
-    """`handrail-cockpit` at an address that asks for the token."""
-
-    def __init__(self, folder):
-        self.root, log = folder / "dataset", folder / "log"
-        command = [sys.executable, "-m", "handrail.scripts", "cockpit", str(self.root), "--task", "reach"]
-        command += ["--mode", "direct", "--time_limit", "3000", "--dataset.num_episodes", "1"]
-        command += ["--cockpit.host", "127.0.0.2", "--cockpit.port", "0"]
-        with log.open("w") as file:
-            self.process = subprocess.Popen(command, stderr=file)
-        while "Drive at" not in log.read_text():
-            assert self.process.poll() is None, log.read_text()
-            time.sleep(0.1)
-        self.log, self.address = log, log.read_text().split("Drive at ")[1].split()[0]
-
-    def memory(self):
-        """Return what recording and web server hold [MB]."""
-        return {
-            "server" if "cockpit.server" in words else "recording": memory(pid)
-            for pid, words in family(self.process.pid).items()
-        }
+def memories(recording):
+    """Return what recording and web server hold [MB]."""
+    return {
+        "server" if "cockpit.server" in words else "recording": memory(pid)
+        for pid, words in family(recording.process.pid).items()
+    }
 
 
 @pytest.fixture
 def recording(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    made = Recording(tmp_path)
-    yield made
-    if made.process.poll() is None:
-        made.process.terminate()
-    made.process.wait(60)
+    flags = ("--task", "reach", "--mode", "direct", "--time_limit", 3000, "--dataset.num_episodes", 1)
+    with closing(Recording(tmp_path, *flags, "--cockpit.host", "127.0.0.2")) as made:
+        yield made
 
 
 def check(said):
@@ -129,12 +114,12 @@ def test_attacks_from_another_address(recording):
         owner.until("driving")
         time.sleep(5.0)
         began = time.time()
-        start, held = len(owner.phases), [recording.memory()]
+        start, held = len(owner.phases), [memories(recording)]
         for _ in range(ROUNDS):
             attack = [sys.executable, cockpit_attacks.__file__, recording.address, owner.cookie]
             said = json.loads(subprocess.run(attack, capture_output=True, check=True, text=True).stdout)
             check(said)
-            held.append(recording.memory())
+            held.append(memories(recording))
             print(said, held[-1], owner.frame["dropped"])
         assert set(owner.phases[start:]) <= {"driving", "lost"}  # a busy machine may make the owner late
         assert all(held[-1][name] - held[1][name] < MOST_GROWTH for name in held[0])

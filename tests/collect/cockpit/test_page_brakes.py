@@ -7,8 +7,6 @@ loop in that episode, so that a busy machine does not make a law fail that holds
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 
@@ -18,6 +16,7 @@ import pytest
 pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from cockpit_witness import Relay, Witness, closing, is_moving, is_still
 from page_driver import PageDriver
+from page_recording import Recording
 
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.scripts.bench.latency.measure import family
@@ -36,48 +35,24 @@ document.dispatchEvent(new Event("visibilitychange"));
 """
 
 
-class Recording:
-    """`handrail-cockpit`, and who watches it."""
+FLAGS = ("--task", "reach", "--dataset.num_episodes", 100, "--time_limit", 600)
 
-    def __init__(self, folder):
-        self.root = folder / "dataset"
-        command = [sys.executable, "-m", "handrail.scripts", "cockpit", str(self.root), "--task", "reach"]
-        command += ["--cockpit.no_open", "--cockpit.port", "0", "--dataset.num_episodes", "100"]
-        command += ["--time_limit", "600"]
-        self.log = folder / "log"
-        with self.log.open("w") as log:
-            self.process = subprocess.Popen(command, stderr=log)
-        while "Drive at" not in self.log.read_text():
-            assert self.process.poll() is None, self.log.read_text()
-            time.sleep(0.1)
-        self.address = self.log.read_text().split("Drive at ")[1].split()[0]
 
-    @property
-    def server(self):
-        """The process of the web server."""
-        (found,) = [pid for pid, words in family(self.process.pid).items() if "cockpit.server" in words]
-        return found
-
-    def steered(self, episode):
-        """Return when somebody last steered [s], and the longest period of the loop [s]."""
-        row = read_episodes(self.root)[episode]
-        frames = read_frames(self.root, episode, ["wall_clock", "teleop.values", "teleop.mask", "action"])
-        steers = np.any(frames["teleop.values"][:, :-1] * frames["teleop.mask"][:, :-1], axis=1)
-        assert steers.any()
-        assert not frames["action"][-1, :-1].any()
-        last = np.flatnonzero(steers)[-1]
-        longest = np.diff(frames["wall_clock"][: last + 2]).max()  # later ones may be pauses
-        return row["started"] + frames["wall_clock"][last], float(longest)
-
-    def close(self):
-        if self.process.poll() is None:
-            self.process.terminate()
-        self.process.wait(60)
+def steered(root, episode):
+    """Return when somebody last steered in an episode [s], and the longest period of its loop [s]."""
+    row = read_episodes(root)[episode]
+    frames = read_frames(root, episode, ["wall_clock", "teleop.values", "teleop.mask", "action"])
+    steers = np.any(frames["teleop.values"][:, :-1] * frames["teleop.mask"][:, :-1], axis=1)
+    assert steers.any()
+    assert not frames["action"][-1, :-1].any()
+    last = np.flatnonzero(steers)[-1]
+    longest = np.diff(frames["wall_clock"][: last + 2]).max()  # later ones may be pauses
+    return row["started"] + frames["wall_clock"][last], float(longest)
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    with closing(Recording(tmp_path_factory.mktemp("brakes"))) as made:
+    with closing(Recording(tmp_path_factory.mktemp("brakes"), *FLAGS)) as made:
         yield made
 
 
@@ -126,7 +101,7 @@ class Driven:
         """The robot came to rest, and nobody has steered since."""
         self.witness.until(is_still)
         self.page.close()
-        last, longest = recording.steered(self.witness.end_episode())
+        last, longest = steered(recording.root, self.witness.end_episode())
         print(f"steered {1e3 * (last - happened):.0f} ms after it, longest period {1e3 * longest:.0f} ms")
         assert last - happened <= WITHIN + longest
 
@@ -262,7 +237,7 @@ def test_the_web_server(chromium, recording, witness, number):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 130), (signal.SIGKILL, -signal.SIGKILL)])
 def test_the_recording_itself(chromium, tmp_path, number, code):
-    with closing(Recording(tmp_path)) as recording, closing(Witness(recording.address)) as witness:
+    with closing(Recording(tmp_path, *FLAGS)) as recording, closing(Witness(recording.address)) as witness:
         witness.until(lambda frame: frame["phase"] == "ready")
         with driven(chromium, recording, witness) as made:
             made.page.close()

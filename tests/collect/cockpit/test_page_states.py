@@ -103,18 +103,6 @@ def test_a_refused_message_is_said_on_the_page_and_a_cut_is_seen(new_page):
         shoot(page, "reconnecting")
 
 
-def test_someone_else_drives(new_page):
-    with bench() as made:
-        first = PageDriver(new_page(), made.address)
-        second = PageDriver(new_page(), made.address)
-        expect(second.at("drives")).to_contain_text("someone else drives")
-        assert second.at("start").is_disabled()
-        shoot(second.page, "someone-else-drives")
-        second.page.get_by_role("button", name="Ask to drive").click()
-        expect(first.at("drives")).to_contain_text("Someone asks to drive")
-        shoot(first.page, "being-asked")
-
-
 def test_a_countdown_starts_the_episode_and_any_action_ends_it(new_page):
     with bench() as made:
         driver = PageDriver(new_page(), made.address)

@@ -80,11 +80,6 @@ def test_the_words_hold_whatever_the_hand_goes_along(new_page, tmp_path, frame):
     check(tmp_path / "reach", 1, "keyboard")
 
 
-def test_reach_by_sticks(new_page, tmp_path):
-    drive(new_page, tmp_path / "reach", "reach", Pad, 5)
-    check(tmp_path / "reach", 5, "gamepad")
-
-
 def test_pick_place_by_keys(new_page, tmp_path):
     drive(new_page, tmp_path / "pick", "pick_place", Keys, 5, "ee", *PATIENT)
     check(tmp_path / "pick", 5, "keyboard", fewest=4)

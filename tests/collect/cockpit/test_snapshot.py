@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from handrail.collect.cockpit import stage
-from handrail.collect.cockpit.disk import DiskWatch
-from handrail.collect.cockpit.lead import AHEAD, base_ahead, hand_ahead
+from handrail.collect.cockpit.disk import DiskRoom
 from handrail.collect.cockpit.nearest import NearestPair
-from handrail.collect.cockpit.snapshot import STATUS, Snapshots, reason
+from handrail.collect.cockpit.snapshot import AHEAD, STATUS, Snapshots, base_ahead, hand_ahead, reason
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
@@ -196,23 +195,12 @@ def test_the_hand_is_the_gripper_with_its_fingers(env):
 
 
 def test_the_disk_says_how_many_episodes_fit(tmp_path):
-    watch = DiskWatch(tmp_path / "to" / "come")
-    try:
-        assert _soon(lambda: watch.left[0] > 0)
-        assert watch.left[1] == -1
-        folder = tmp_path / "to" / "come"
-        folder.mkdir(parents=True)
-        (folder / "data").write_bytes(bytes(2_000_000))
-        watch.saved(2)
-        assert _soon(lambda: watch.left[1] > 0)
-        free, episodes = watch.left
-        assert episodes == pytest.approx(free / 1_000_000, rel=0.1)
-    finally:
-        watch.close()
-
-
-def _soon(come, patience=10.0):
-    until = time.monotonic() + patience
-    while not come() and time.monotonic() < until:
-        time.sleep(0.01)
-    return come()
+    folder = tmp_path / "to" / "come"
+    room = DiskRoom(folder)
+    assert room.left[0] > 0
+    assert room.left[1] == -1
+    folder.mkdir(parents=True)
+    (folder / "data").write_bytes(bytes(2_000_000))
+    room.measure(2)
+    free, episodes = room.left
+    assert episodes == pytest.approx(free / 1_000_000, rel=0.1)
