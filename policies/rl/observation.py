@@ -42,10 +42,8 @@ class TrackingSituation:
 def check_robot(model: RobotModel) -> None:
     """Check that a robot is of the kind that a policy drives."""
     if len(model.description.base.joints) != 3 or model.size != 9:
-        raise HandrailError(
-            f"robot {model.description.name} of the reinforcement-learning baseline: "
-            f"expected a planar base and six arm joints, got {', '.join(model.joints)}"
-        )
+        words = f"expected a planar base and six arm joints, got {', '.join(model.joints)}"
+        raise HandrailError(f"robot {model.description.name} of the learnt baseline: {words}")
 
 
 def observe(situation: TrackingSituation) -> FloatArray:

@@ -39,9 +39,7 @@ class Actor:
         wanted = [(out, into) for into, out in itertools.pairwise(sizes)]
         found = [weight.shape for weight in self.weights]
         if found != wanted or sizes[-1] != ACTION_SIZE:
-            raise HandrailError(
-                f"layers of an actor: expected {OBSERVATION_SIZE} to {ACTION_SIZE} numbers, got {found}"
-            )
+            raise HandrailError(f"layers of an actor: expected {wanted}, got {found}")
         if not all(np.all(np.isfinite(array)) for array in self.weights + self.biases):
             raise HandrailError("weights of an actor: expected finite numbers")
 
@@ -96,7 +94,5 @@ class Actor:
                 weights = tuple(arrays[f"weight_{i}"] for i in layers)
                 biases = tuple(arrays[f"bias_{i}"] for i in layers)
         except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
-            raise HandrailError(
-                f"actor {path}: expected an .npz file of one, got {message_of(error)}"
-            ) from error
+            raise HandrailError(f"actor {path}: expected an .npz file, got {message_of(error)}") from error
         return cls(weights, biases)

@@ -9,8 +9,7 @@ from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.training.presets import check_policy, resolved
-from handrail.policies.imitation.training.resume import as_json
+from handrail.policies.imitation.training.presets import as_json, check_policy, resolved
 from handrail.policies.study.design import MOST_DRAWS, StudyDesign
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 

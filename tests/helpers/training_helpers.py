@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from handrail.collect.config import SessionConfig, StoredConfig
 from handrail.collect.session.recorded import settings_json
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
 from handrail.datasets.format.manifest import Manifest
@@ -87,6 +89,15 @@ def tiny(root: Path, output: Path, *options: str, **settings) -> TrainConfig:
     source = StoredConfig("handrail/test", str(root))
     size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)} | settings
     return TrainConfig(source, str(output), **size)
+
+
+def refused(config: TrainConfig, words: str) -> None:
+    """The law: what cannot be trained is one line."""
+    from handrail.policies.imitation.training.training import train
+
+    with pytest.raises(HandrailError, match=words) as error:
+        train(config, quiet=True)
+    assert "\n" not in str(error.value)
 
 
 def cut(config: TrainConfig, folder: Path) -> TrainConfig:

@@ -98,9 +98,7 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
         meta = replace(meta, environment=task, robot=robot)
         movers, joined = _movers_of(sizes, where, meta)
     if not TASKS.accepts(meta.environment):
-        raise HandrailError(
-            f"{where}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
-        )
+        raise HandrailError(f"{where}: expected a task of {', '.join(TASKS)}, got {meta.environment!r}")
     return Checkpoint(place, meta, pictures, movers, joined, _digest(place))
 
 
@@ -151,10 +149,8 @@ def _movers_of(given: Mapping[str, int], where: str, meta: PolicyMeta) -> tuple[
     """Return of how many moving obstacles a policy of recorded columns knows, and if it reads one vector."""
     others = sorted(given.keys() - {STATE, ENVIRONMENT, ACTION})
     if others or ACTION not in given:
-        raise HandrailError(
-            f"{where}: expected a policy that reads {STATE}, {ENVIRONMENT} and cameras, and writes {ACTION};"
-            f" got {', '.join(others) or 'no action'}"
-        )
+        words = f"expected {STATE}, {ENVIRONMENT}, cameras and {ACTION} alone"
+        raise HandrailError(f"{where}: {words}, got {', '.join(others) or 'no action'}")
     state = len(AgentObservation(load_model(meta.robot)).names)
     action = len(RecordedColumns.of(meta).action_names)
     known: list[dict[str, int]] = []
@@ -168,9 +164,8 @@ def _movers_of(given: Mapping[str, int], where: str, meta: PolicyMeta) -> tuple[
             known.append({STATE: state + scene, ACTION: action})
             if given.items() <= known[-1].items():
                 return movers, True
-    raise HandrailError(
-        f"{where}: expected the features of {meta.robot} in {meta.environment}, {known}, got {given}"
-    )
+    expected = f"the features of {meta.robot} in {meta.environment}, {known}"
+    raise HandrailError(f"{where}: expected {expected}, got {given}")
 
 
 def _digest(folder: Path) -> str:

@@ -60,11 +60,8 @@ def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], li
             continue
         before = found.setdefault((condition.label, checkpoint.key), condition)
         if before != condition:
-            raise HandrailError(
-                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but"
-                f" condition {condition.label!r} has {checkpoint.key} already, {before.checkpoint.folder};"
-                " give it a --label"
-            )
+            words = "expected each dataset draw and training seed once under a --label"
+            raise HandrailError(f"--policy {checkpoint.folder}: {words}, got {before.checkpoint.folder} too")
     if not found:
         raise HandrailError("; ".join(refused))
     return list(found.values()), list(refused)
@@ -85,10 +82,8 @@ def _condition(
     own = own_protection(mode)
     chosen = own if protection == "own" else protection
     if mode and chosen not in (own, "none"):
-        raise HandrailError(
-            f"--protection {protection}: expected a policy of joint velocities, or own or none; "
-            f"{checkpoint.folder} decides on the intent of mode {mode}"
-        )
+        words = f"own or none, or a policy of joint velocities; {checkpoint.folder} writes intents"
+        raise HandrailError(f"--protection {protection}: expected {words} of mode {mode}")
     name = config.label or " ".join(filter(None, (meta.mode or meta.policy, "intent" if mode else "")))
     protected = {"none": "unprotected", own: ""}.get(chosen, chosen)
     label = " ".join(filter(None, (name, protected, perturbation.words)))

@@ -96,9 +96,7 @@ class EvaluateConfig(ExecutionConfig):
             if not given or len(set(given)) != len(given):
                 raise HandrailError(f"--{flag} {getattr(self, flag)}: expected one or more, each once")
         if not self.folders:
-            raise HandrailError(
-                "policy: expected one checkpoint folder or more, such as outputs/act; got none"
-            )
+            raise HandrailError("policy: expected one checkpoint folder or more, as outputs/act; got none")
         for flag, path, ending in (("json", self.json, ".json"), ("video", self.video, ".mp4")):
             file = Path(path).expanduser()
             if path and not (path.endswith(ending) and file.absolute().parent.is_dir()):

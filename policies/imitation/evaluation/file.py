@@ -29,9 +29,7 @@ class EvaluationFile:
             read_evaluations([path])
             self.content |= read_json(path)
             if not isinstance(self.content["conditions"], dict):
-                raise HandrailError(
-                    f"--json {path}: expected conditions by label, got {self.content['conditions']!r:.80}"
-                )
+                raise HandrailError(f"--json {path}: expected conditions by label, got others")
 
     def open(self, conditions: Sequence[PolicyCondition]) -> None:
         """Check that conditions fit what is there."""
@@ -44,13 +42,11 @@ class EvaluationFile:
             before = self.content["conditions"].get(label)
             if label in self.content["arms"] and before != condition.conditions:
                 raise HandrailError(
-                    f"{where}: expected {before}, got {condition.conditions};"
-                    " choose another --label or --json"
+                    f"{where}: expected {before}, got {condition.conditions}; say another --label"
                 )
             if entry and entry.get("checkpoint") != checkpoint.digest:
                 raise HandrailError(
-                    f"{where}: has another policy with dataset draw and training seed {checkpoint.key} "
-                    f"than {checkpoint.folder}; choose another --label or --json"
+                    f"{where}: has another policy of dataset draw, seed {checkpoint.key}"
                 )
 
     def done(self, condition: PolicyCondition) -> set[int]:

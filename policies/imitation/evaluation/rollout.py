@@ -25,8 +25,7 @@ from handrail.controllers.interface.controller import Controller
 from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import PolicyCondition, own_protection
 from handrail.policies.imitation.evaluation.operator import PolicyOperator, RecordedColumns
-from handrail.policies.imitation.interface.torch_state import repeatable, threads
-from handrail.policies.imitation.interface.trained import TrainedPolicy
+from handrail.policies.imitation.interface.trained import TrainedPolicy, repeatable, threads
 
 Load = Callable[[Path], TrainedPolicy]
 Row = dict[str, Any]
@@ -111,9 +110,7 @@ def _session_config(condition: PolicyCondition) -> SessionConfig:
     checkpoint = condition.checkpoint
     sizes = {size for picture in checkpoint.pictures.values() for size in picture} or {128}
     if len(sizes) > 1:
-        raise HandrailError(
-            f"{checkpoint.folder}: expected square pictures of one size, got {checkpoint.pictures}"
-        )
+        raise HandrailError(f"{checkpoint.folder}: expected square pictures, got {checkpoint.pictures}")
     return SessionConfig(
         task=checkpoint.meta.environment,
         robot=checkpoint.meta.robot,

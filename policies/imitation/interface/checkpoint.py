@@ -108,10 +108,8 @@ def read_meta(folder: Path) -> PolicyMeta:
     meta = decoded(content, PolicyMeta, repr(str(path)))
     written = meta.interface.actions if meta.interface else "recorded"
     if meta.actions != written or (written == "intent" and not meta.mode):
-        raise HandrailError(
-            f"{str(path)!r}: expected actions {written}, as its interface has them, and a mode for an intent;"
-            f" got {meta.actions} of mode {meta.mode!r}"
-        )
+        words = f"expected actions {written}, as its interface has, and a mode for an intent"
+        raise HandrailError(f"{str(path)!r}: {words}; got {meta.actions} of mode {meta.mode!r}")
     return meta
 
 

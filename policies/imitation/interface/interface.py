@@ -47,10 +47,8 @@ class PolicyInterface:
         """Check the masks."""
         count = len(self.channels)
         if {len(mask) for mask in self.masks} != ({count} if self.actions == "intent" else set()):
-            raise HandrailError(
-                f"masks: expected some of {count} channels for an intent and none else, got"
-                f" {shown(self.masks)} for {self.actions}"
-            )
+            words = f"of {count} channels each for an intent and none else"
+            raise HandrailError(f"masks: expected some {words}, got {shown(self.masks)} for {self.actions}")
 
     @classmethod
     def of_dataset(
@@ -171,8 +169,6 @@ class PolicyInterface:
 def _names(features: Mapping[str, Feature], key: str) -> tuple[str, ...]:
     feature = features.get(key)
     if feature is None or feature.names is None:
-        raise HandrailError(
-            f"dataset: expected a column {key!r} with named entries, as handrail-record writes it,"
-            f" got {'none' if feature is None else 'one without names'}"
-        )
+        found = "none" if feature is None else "one without names"
+        raise HandrailError(f"dataset: expected a column {key!r} with named entries, got {found}")
     return feature.names

@@ -127,8 +127,7 @@ class RelativeView:
         missing = [name for name in self._needed if name not in self.state_names]
         if missing:
             raise HandrailError(
-                f"observation.state: expected {', '.join(self._needed[:9])}, … as handrail-record writes it;"
-                f" missing: {', '.join(missing)}"
+                f"observation.state: expected that of handrail-record; no {', '.join(missing)}"
             )
 
     @property

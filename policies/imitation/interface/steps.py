@@ -131,11 +131,9 @@ class PolicyActionStep(PolicyStep):
 
         robot = newest_robot()
         if robot and robot.is_connected and len(names := robot.action.names) != size:
-            raise self._error(
-                f"the policy writes {size} numbers; --robot.mode={robot.mode.name} takes"
-                f" {len(names)}: {', '.join(names)}; expected direct for joint velocities, for intents the"
-                " mode of their demonstrations"
-            )
+            said = f"--robot.mode={robot.mode.name} takes {len(names)}: {', '.join(names)}"
+            words = "direct for joint velocities, for intents the mode of their demonstrations"
+            raise self._error(f"the policy writes {size} numbers; {said}; expected {words}")
 
     def _error(self, words: str) -> HandrailError:
         return HandrailError(f"step {getattr(self, '_registry_name', '')}: {words}")
@@ -176,9 +174,8 @@ class PolicyCompletionStep(PolicyActionStep):
     def _around(self, key: str, count: int) -> FloatArray:
         values = self.view.raw.get(key) if self.view else None
         if not isinstance(values, torch.Tensor) or len(values) != count:
-            raise self._error(
-                f"expected {key} of {count} robots, as --env.type=handrail shows it; got {_shape(values)}"
-            )
+            words = f"{key} of {count} robots, as --env.type=handrail shows it"
+            raise self._error(f"expected {words}; got {_shape(values)}")
         return values.detach().cpu().numpy().astype(np.float64)
 
 
@@ -227,10 +224,8 @@ def _numbers(observation: Mapping[str, Any], key: str, size: int) -> FloatArray:
     """Return the numbers under a key, (B, size)."""
     values = observation.get(key)
     if not isinstance(values, torch.Tensor) or _size(values) != size:
-        raise HandrailError(
-            f"step {VIEW}: expected {key} with {size} numbers, as handrail-record writes it,"
-            f" got {_shape(values)}"
-        )
+        words = f"expected {key} with {size} numbers, as recorded"
+        raise HandrailError(f"step {VIEW}: {words}; got {_shape(values)}")
     return values.detach().cpu().numpy().reshape(-1, size)
 
 

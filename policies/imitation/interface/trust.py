@@ -36,9 +36,8 @@ def check_links(folder: Path) -> None:
     """Check that everything in a folder lies in it, and is a file or a folder."""
     for path in sorted(folder.glob("*")):
         if not is_inside(path, folder):
-            raise HandrailError(
-                f"{str(path)!r}: expected a file in the folder, found a link out of it; copy it with cp -rL"
-            )
+            words = "expected a file in the folder, found a link out of it; copy it with cp -rL"
+            raise HandrailError(f"{str(path)!r}: {words}")
         try:
             if not path.is_dir():
                 regular(path)
@@ -115,10 +114,8 @@ def _check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
     """Check that settings name no other place."""
     for text in set(_texts(settings)).difference(known):
         if "/" in text or "\\" in text or (text and _is_there(text)):
-            raise HandrailError(
-                f"{str(path)!r}: expected settings of the policy alone, got {shown(text)}, which names"
-                " a file, a folder or a repository elsewhere"
-            )
+            words = f"got {shown(text)}, which names a file, a folder or a repository elsewhere"
+            raise HandrailError(f"{str(path)!r}: expected settings of the policy alone, {words}")
 
 
 def _defaults(kind: type) -> Iterator[Any]:

@@ -18,7 +18,7 @@ from torch.optim.lr_scheduler import LambdaLR
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import MODEL
 from handrail.policies.imitation.interface.steps import without_steps
-from handrail.policies.imitation.interface.torch_state import check_numbers, load_weights
+from handrail.policies.imitation.interface.trained import check_numbers, load_weights
 from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
 from handrail.policies.imitation.training.plateau import Plateau
 

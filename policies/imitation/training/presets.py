@@ -1,14 +1,17 @@
-"""Sizes of policies that suit a CPU or a GPU, and LeRobot's configuration of a policy."""
+"""Sizes of policies that suit a CPU or a GPU, and LeRobot's configuration of a policy; both as they began."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+import json
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.datasets.storage.strict_json import parse_json
-from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
+from handrail.policies.imitation.interface.checkpoint import PolicyMeta
 from handrail.policies.imitation.interface.trust import registered_policies
-from handrail.policies.imitation.training.refusal import in_one_line
 
 if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
@@ -30,6 +33,8 @@ class Preset:
     """Samples an update."""
 
 
+_REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
+_OLDER = {"base_pose": False, "scene": True}  # of a training before that could be said
 _ENSEMBLE = "temporal_ensemble_coeff"
 ACT_CPU: dict[str, Any] = {
     "chunk_size": 20,
@@ -113,6 +118,22 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     return policy
 
 
+@contextmanager
+def in_one_line(config: TrainConfig) -> Iterator[None]:
+    """Turn what is raised while a policy is built or trained into one line."""
+    try:
+        yield
+    except OSError as error:
+        raise HandrailError(f"training in {config.output}: {message_of(error)}") from error
+    except _REFUSALS as error:
+        frames = traceback.walk_tb(error.__traceback__)
+        names = [str(frame.f_globals.get("__name__")).partition(".")[0] for frame, _ in frames]
+        known = [name for name in names if name in ("handrail", "lerobot", "accelerate")]
+        if known[-1:] in ([], ["handrail"]):  # neither LeRobot nor accelerate, nor what they called
+            raise
+        raise HandrailError(f"policy {config.policy}: {message_of(error)}") from error
+
+
 def check_policy(config: TrainConfig) -> None:
     """Build a policy once, for made-up inputs, so that what it refuses is known before there is data.
 
@@ -133,8 +154,35 @@ def check_policy(config: TrainConfig) -> None:
         get_policy_class(config.policy)(described)
 
 
+def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
+    """Check that settings are those of a checkpoint, and its sizes still those of the preset."""
+    now, then = as_json(config), _OLDER | dict(began.training)
+    for entry in fields(config):
+        if entry.name not in FREE_ON_RESUME and entry.name in then:
+            _check_same(f"--{entry.name}", now[entry.name], then[entry.name])
+    sizes = as_json(resolved(config))
+    least = began.sizes.get("steps", began.steps)
+    if sizes["steps"] < least:
+        raise HandrailError(f"--resume with --steps {sizes['steps']}: expected {least} or more, as it began")
+    for name in ("lr", "cosine", "batch_size"):
+        _check_same(f"the preset's {name}", sizes[name], began.sizes.get(name, sizes[name]))
+    options = began.sizes.get("options", sizes["options"])
+    for name in sorted(options.keys() | sizes["options"].keys()):
+        _check_same(f"the policy's {name}", sizes["options"].get(name), options.get(name))
+
+
+def as_json(settings: Any) -> Mapping[str, Any]:
+    """Return the fields of a dataclass as they come back from a file."""
+    return json.loads(json.dumps(asdict(settings)))
+
+
 def _value(text: str) -> Any:
     try:
         return parse_json(text.encode())
     except ValueError:
         return None if text in ("None", "none") else {"True": True, "False": False}.get(text, text)
+
+
+def _check_same(what: str, now: Any, then: Any) -> None:
+    if now != then:
+        raise HandrailError(f"--resume with {what} {now}: expected {then} as the training began")

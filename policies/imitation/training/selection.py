@@ -48,19 +48,11 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
     else:
         minutes = frames / fps / _MINUTE
         if config.minutes and minutes < config.minutes * (1.0 - 1e-9):
-            raise HandrailError(
-                f"--minutes {config.minutes:g}: expected at most the {minutes:.2f} min recorded"
-            )
+            raise HandrailError(f"--minutes {config.minutes:g}: expected at most the {minutes:.2f} recorded")
         if config.episodes and not config.minutes:
-            raise HandrailError(
-                f"--episodes {config.episodes}: expected at most the {len(kept)} that there are"
-            )
+            raise HandrailError(f"--episodes {config.episodes}: expected at most the {len(kept)} there are")
     if not kept:
-        raise HandrailError(
-            f"no episode left to train on: expected one or more among {len(attempts)}"
-            f"{' that succeeded' if config.success_only else ''}"
-            f"{f' within {config.minutes:g} min' if config.minutes else ''}"
-        )
+        raise HandrailError(f"no episode left to train on, of {len(attempts)}: expected one or more")
     return Selection(tuple(sorted(kept, key=lambda row: row["episode_index"])), taken, frames / fps)
 
 
@@ -76,8 +68,7 @@ def select_again(rows: Sequence[Row], numbers: Sequence[int], trained_on: Mappin
     missing = [number for number in numbers if number not in there]
     if missing:
         raise HandrailError(
-            f"--resume: expected the {len(numbers)} episodes that the training began with, "
-            f"but the dataset has no episode {missing[0]}"
+            f"--resume: expected the episodes of before; the dataset has no episode {missing[0]}"
         )
     kept = tuple(there[number] for number in numbers)
     return Selection(kept, int(trained_on["attempts"]), trained_on["operator_time"])
@@ -89,10 +80,8 @@ def hold_out(rows: Sequence[Row], config: TrainConfig) -> tuple[list[Row], list[
         return list(rows), []
     count = max(_FEWEST_HELD_OUT, math.ceil(config.eval_split * len(rows)))
     if count >= len(rows):
-        raise HandrailError(
-            f"--eval_split {config.eval_split:g}: expected more than {count} episodes, to hold {count} out;"
-            f" got {len(rows)}"
-        )
+        words = f"expected more than {count} episodes, to hold {count} out; got {len(rows)}"
+        raise HandrailError(f"--eval_split {config.eval_split:g}: {words}")
     chosen = set(np.random.default_rng([config.draw, 1]).permutation(len(rows))[:count].tolist())
     held_out = [row for place, row in enumerate(rows) if place in chosen]
     return [row for place, row in enumerate(rows) if place not in chosen], held_out

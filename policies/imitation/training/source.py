@@ -28,8 +28,14 @@ from handrail.policies.imitation.interface.interface import (
     STATE,
     PolicyInterface,
 )
-from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
-from handrail.policies.imitation.training.pictures import PICTURES, open_pictures, picture_stats, pictured
+from handrail.policies.imitation.training.memory import (
+    PICTURES,
+    MemoryDataset,
+    MemoryMeta,
+    open_pictures,
+    picture_stats,
+    pictured,
+)
 from handrail.policies.imitation.training.selection import Row, Selection, hold_out, select, select_again
 
 if TYPE_CHECKING:
@@ -80,6 +86,16 @@ class TrainingSource:
             "operator_time": self.selection.operator_time,
         }
         return numbers | ({"held_out": len(held_out)} if held_out else {})
+
+    def check_same(self, began: PolicyMeta) -> None:
+        """Check that this is what a checkpoint learnt from.
+
+        A checkpoint of an earlier version says nothing of pictures, or only how many episodes and how long.
+        """
+        same = self.digest.startswith(began.data) if began.data else self.trained_on == began.trained_on
+        if not same:
+            count = began.trained_on.get("episodes", 0)
+            raise HandrailError(f"--resume: expected the {count:g} episodes that it began with, got others")
 
     @property
     def split(self) -> tuple[list[Row], list[Row]]:
@@ -168,10 +184,8 @@ def _interpreted(
         _check_one_mode(selection, config.mode)
     missing = [key for key in COLUMNS if key not in info.features]
     if missing:
-        raise HandrailError(
-            f"--actions {actions}: expected the columns that handrail-record writes, found no"
-            f" {', '.join(missing)}; for other datasets say --actions recorded"
-        )
+        words = f"found no {', '.join(missing)}; for other datasets say --actions recorded"
+        raise HandrailError(f"--actions {actions}: expected the columns of handrail-record, {words}")
     masks = _episodes(info, selection, [MASK])
     interface = PolicyInterface.of_dataset(info.features, masks, actions, config.base_pose)
 
@@ -193,10 +207,8 @@ def _check_one_mode(selection: Selection, said: str) -> None:
     found = ", ".join(f"{mode or 'no mode'} ({count})" for mode, count in modes.most_common())
     known = next((mode for mode, _ in modes.most_common() if mode in MODES), None)
     flag = f"--mode {known}" if known else "--actions realised"
-    raise HandrailError(
-        f"--actions intent: expected episodes of one teleop mode, whose controller completes the intent when"
-        f" the policy drives; got {found}; say {flag}"
-    )
+    words = "expected episodes of one teleop mode, whose controller completes the intent"
+    raise HandrailError(f"--actions intent: {words}; got {found}; say {flag}")
 
 
 def _recorded(info: DatasetInfo, selection: Selection, config: TrainConfig) -> tuple[Features, Columns]:
@@ -218,16 +230,13 @@ def _recorded(info: DatasetInfo, selection: Selection, config: TrainConfig) -> t
     numbers = [key for key in features if key.startswith("observation")]
     if STATE not in numbers and config.policy in _READ_STATE:
         beside = " beside pictures (--images)" if cameras else ""
-        raise HandrailError(
-            f"{where}: expected a column {STATE!r}, which policy {config.policy} needs{beside};"
-            f" got {', '.join((*numbers, *cameras)) or 'no observation'}"
-        )
+        found = ", ".join((*numbers, *cameras)) or "no observation"
+        words = f"expected a column {STATE!r}, which policy {config.policy} needs{beside}"
+        raise HandrailError(f"{where}: {words}; got {found}")
     blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
     if blind and cameras and not config.images:
-        raise HandrailError(
-            f"{where}: expected {ENVIRONMENT!r} or --images for policy {config.policy};"
-            f" there are pictures ({', '.join(cameras)}): say --images"
-        )
+        words = f"expected {ENVIRONMENT!r} or --images for policy {config.policy}"
+        raise HandrailError(f"{where}: {words}; there are pictures ({', '.join(cameras)}): say --images")
     return features, columns
 
 

@@ -26,13 +26,17 @@ from handrail.policies.imitation.interface.checkpoint import (
     origin_of,
     read_meta,
 )
-from handrail.policies.imitation.interface.torch_state import threads
+from handrail.policies.imitation.interface.trained import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
 from handrail.policies.imitation.training.plateau import Plateau
-from handrail.policies.imitation.training.presets import policy_config, resolved
-from handrail.policies.imitation.training.refusal import in_one_line
-from handrail.policies.imitation.training.resume import as_json, check_data, check_settings
+from handrail.policies.imitation.training.presets import (
+    as_json,
+    check_settings,
+    in_one_line,
+    policy_config,
+    resolved,
+)
 from handrail.policies.imitation.training.run import TrainingRun
 from handrail.policies.imitation.training.source import TrainingSource, read_source
 
@@ -54,7 +58,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     source, steps = read_source(config, began), resolved(config).steps
     losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
     if began is not None:
-        check_data(source, began)
+        source.check_same(began)
     plateau, warmup = None, min(_WARMUP, steps // 10)
     if config.patience:
         plateau = Plateau(losses, config.patience, config.improvement, steps, warmup)
@@ -122,9 +126,7 @@ def _begin(config: TrainConfig) -> Path | None:
     kept = [path for path in (folder / "checkpoints").glob("*") if not _is_checkpoint(path)]
     others = [path for path in folder.iterdir() if path.name not in _OURS]
     if foreign := sorted(path.relative_to(folder).as_posix() for path in (*others, *kept)):
-        raise HandrailError(
-            f"{where}: expected a missing or empty folder, found {', '.join(foreign[:3])}; choose another"
-        )
+        raise HandrailError(f"{where}: expected a missing or empty folder, found {', '.join(foreign[:3])}")
     if any(folder.iterdir()) and not config.overwrite:
         raise HandrailError(f"{where}: there is a training already; say --resume or --overwrite")
     shutil.rmtree(folder)

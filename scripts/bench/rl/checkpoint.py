@@ -6,7 +6,7 @@ are read here: networks and optimisers from `model.zip`, transitions from `repla
 
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
@@ -17,9 +17,9 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.save_util import load_from_zip_file
 
-from handrail.controllers.entries import is_amounts
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, message_of, shown
 from handrail.controllers.regular_file import open_regular, regular
+from handrail.controllers.typed import NonNegative, check, decoded
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.datasets.storage.strict_json import load_json, write_json
 from handrail.policies.imitation.interface.trust import check_links
@@ -60,14 +60,9 @@ def begin_run(config: TrainRlConfig) -> None:
 
 def check_resumes(config: TrainRlConfig) -> Path:
     """Return the last checkpoint of a run that goes on with these settings."""
-    last = _there(config.folder, "--resume")
+    last = _last(config.folder, "--resume")
     path = config.folder / "config.json"
-    settings = load_json(path, "settings of a training run")
-    try:
-        earlier = TrainRlConfig(**{**settings, "layers": tuple(settings["layers"])})
-    except (TypeError, KeyError) as error:
-        found = f"{settings!r:.80}"
-        raise HandrailError(f"{str(path)!r}: expected settings of a training run, got {found}") from error
+    earlier = decoded(load_json(path, "settings of a training run"), TrainRlConfig, repr(str(path)))
     config.check_continues(earlier)
     return last
 
@@ -96,7 +91,7 @@ def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
 
 def start_from(folder: Path, model: SAC) -> None:
     """Give a model the actor and critics of a run's last checkpoint, not the optimisers' memory."""
-    last = _there(folder, "--start_from")
+    last = _last(folder, "--start_from")
     parameters, _ = _tensors(last / _NETWORKS)
     try:
         model.policy.load_state_dict(parameters["policy"])
@@ -117,7 +112,7 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor | None, curve: Curve
     if actor is not None:
         (folder / "actors").mkdir(exist_ok=True)
         actor.save(folder / "actors" / f"{name}.npz")
-    last, final = _last(folder), folder / "checkpoints" / name
+    earlier, final = _checkpoints(folder), folder / "checkpoints" / name
     partial = final.with_suffix(".partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
@@ -128,8 +123,8 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor | None, curve: Curve
     np.savez(partial / _TRANSITIONS, place=np.array([buffer.pos, buffer.full]), **arrays)
     write_json(partial / _CURVE, curve)
     publish_folder(partial, final)
-    if last is not None:
-        shutil.rmtree(last)
+    for path in earlier[-1:]:
+        shutil.rmtree(path)
 
 
 def evaluated_actors(folder: Path, most: int) -> list[Actor]:
@@ -137,18 +132,17 @@ def evaluated_actors(folder: Path, most: int) -> list[Actor]:
     return [Actor.load(path) for path in sorted((folder / "actors").glob("*.npz"))[-most:]]
 
 
-def _last(folder: Path) -> Path | None:
-    found = sorted(path for path in (folder / "checkpoints").glob("*") if _STEPS.fullmatch(path.name))
-    return found[-1] if found else None
+def _checkpoints(folder: Path) -> list[Path]:
+    return sorted(path for path in (folder / "checkpoints").glob("*") if _STEPS.fullmatch(path.name))
 
 
-def _there(folder: Path, flag: str) -> Path:
+def _last(folder: Path, flag: str) -> Path:
     """Return the last checkpoint of somebody's run."""
-    last = _last(folder)
-    if last is None:
+    found = _checkpoints(folder)
+    if not found:
         raise HandrailError(f"{flag}: expected a run with a checkpoint in {folder}, found none")
-    check_links(last)
-    return last
+    check_links(found[-1])
+    return found[-1]
 
 
 def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
@@ -157,26 +151,23 @@ def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]
         _, parameters, variables = load_from_zip_file(regular(path), load_data=False, device="cpu")
     except Exception as error:  # of zipfile, pickle and PyTorch: whatever the file holds, it is refused
         raise _broken(path, error) from error
-    if not all(values.isfinite().all() for values in _leaves([parameters, variables])):
+    if not _is_finite([parameters, variables]):
         raise _broken(path, "NaN or infinity")
     return parameters, variables or {}
 
 
-def _leaves(content: Any) -> Iterator[torch.Tensor]:
-    """Yield every tensor in nested state dictionaries."""
+def _is_finite(content: Any) -> bool:
+    """Return whether every tensor in nested state dictionaries is finite."""
     if isinstance(content, torch.Tensor):
-        yield content
-    elif isinstance(content, Mapping | list):
-        for each in content.values() if isinstance(content, Mapping) else content:
-            yield from _leaves(each)
+        return bool(content.isfinite().all())
+    inside = content.values() if isinstance(content, Mapping) else content
+    return all(map(_is_finite, inside)) if isinstance(content, Mapping | list) else True
 
 
 def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
     if not path.is_file():
-        raise HandrailError(
-            f"{str(path)!r}: expected the transitions of a run of this version, found none;"
-            " --start_from begins a new run with the networks of this one"
-        )
+        words = "found none; --start_from begins a new run with the networks of this one"
+        raise HandrailError(f"{str(path)!r}: expected the transitions of a run, {words}")
     try:
         with open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:
             place, full = map(int, arrays["place"])
@@ -195,13 +186,12 @@ def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
 
 def _curve(path: Path, steps: int) -> Curve:
     """Return the curve of a checkpoint after so many steps."""
-    curve = load_json(path, "the curve of a training run")
-    rows = curve if isinstance(curve, list) and all(map(is_amounts, curve)) else []
+    what = "the curve of a training run"
+    where = f"{str(path)!r}: expected {what} until step {steps}"
+    rows = check(load_json(path, what), list[dict[str, NonNegative]], where)
     whole = all(row.keys() >= _ROW for row in rows[:-1]) and all(row.keys() >= _UNTIL for row in rows[-1:])
     if not rows or not whole or rows[-1]["steps"] != steps:
-        raise HandrailError(
-            f"{str(path)!r}: expected the curve of a training run until step {steps}, got {curve!r:.80}"
-        )
+        raise HandrailError(f"{where}, got {shown(rows)}")
     return rows
 
 

@@ -8,7 +8,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
@@ -56,7 +55,16 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     """
     config.check()
     torch.set_num_threads(config.threads)
-    model, curve, seconds = _resumed(config) if config.resume else _new(config)
+    curve: Curve = []
+    seconds, last = 0.0, check_resumes(config) if config.resume else None
+    if last is None:
+        begin_run(config)
+    model = new_model(config)
+    if last is not None:
+        curve, seconds = resume_run(last, model)
+        model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
+    elif config.start_from:
+        start_from(Path(config.start_from).expanduser(), model)
     _learn(config, model, curve, seconds)
     actor = Actor.mean(evaluated_actors(config.folder, config.average))
     actor.save(config.folder / "actor.npz")
@@ -72,14 +80,13 @@ def _learn(config: TrainRlConfig, model: SAC, curve: Curve, seconds: float) -> N
     remaining = max(config.steps - model.num_timesteps, 0)
     if not remaining and _is_evaluated(model, curve):
         return
-    with Interrupts() as interrupts:
-        callback = Watch(config, curve, seconds, interrupts)
-        try:
-            with interrupts.deferred():
-                model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
-        except KeyboardInterrupt:
-            goes_on = f"--resume goes on after step {model.num_timesteps}"
-            raise KeyboardInterrupt(f"training: interrupted; {goes_on}") from None
+    try:
+        with Interrupts() as interrupts, interrupts.deferred():
+            callback = Watch(config, curve, seconds, interrupts)
+            model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
+    except KeyboardInterrupt:
+        goes_on = f"--resume goes on after step {model.num_timesteps}"
+        raise KeyboardInterrupt(f"training: interrupted; {goes_on}") from None
 
 
 def _is_evaluated(model: SAC, curve: Curve) -> bool:
@@ -153,19 +160,16 @@ class Watch(BaseCallback):
         write_checkpoint(self._config.folder, self.model, actor, self._curve)
 
 
-def _new(config: TrainRlConfig) -> tuple[SAC, Curve, float]:
-    begin_run(config)
-    model = new_model(config)
-    if config.start_from:
-        start_from(Path(config.start_from).expanduser(), model)
-    return model, [], 0.0
-
-
 def new_model(config: TrainRlConfig) -> SAC:
     """Return an actor and critics that have learned nothing."""
+    reward = Reward(config.reward_scale, config.action_change, config.action_size, config.failure_cost)
+    matrix = conditioning()
+    space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
+    env = GoalReachingEnv(reward=reward, physics=config.physics, repeat_missed=config.repeat_missed)
+    env = TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)
     return SAC(
         "MlpPolicy",
-        _environment(config),
+        env,
         learning_rate=config.learning_rate,
         buffer_size=config.buffer_size,
         learning_starts=config.random_steps,
@@ -181,27 +185,6 @@ def new_model(config: TrainRlConfig) -> SAC:
         seed=config.seed,
         device="cpu",
     )
-
-
-def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve, float]:
-    last = check_resumes(config)
-    model = new_model(config)
-    curve, seconds = resume_run(last, model)
-    model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
-    return model, curve, seconds
-
-
-def _environment(config: TrainRlConfig) -> gymnasium.Env:
-    reward = Reward(
-        scale=config.reward_scale,
-        change=config.action_change,
-        size=config.action_size,
-        failure=config.failure_cost,
-    )
-    matrix = conditioning()
-    space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
-    env = GoalReachingEnv(reward=reward, physics=config.physics, repeat_missed=config.repeat_missed)
-    return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)
 
 
 def _record(config: TrainRlConfig, curve: Curve, final: dict[str, dict[str, float]]) -> dict[str, Any]:

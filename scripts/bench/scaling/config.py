@@ -41,9 +41,8 @@ class ScalingConfig(ReportConfig):
         """Where it is recorded, one after the other."""
         words = [word.strip() for word in self.workers.split(",")]
         if not all(word.isdecimal() and 1 <= int(word) <= MOST_WORKERS for word in words):
-            raise HandrailError(
-                f"--workers {self.workers}: expected whole numbers from 1 to {MOST_WORKERS}, such as 1,2"
-            )
+            words = f"expected whole numbers from 1 to {MOST_WORKERS}, such as 1,2"
+            raise HandrailError(f"--workers {self.workers}: {words}")
         shared = (ExecutionConfig(ray=self.ray),) if self.ray else ()
         return (*(ExecutionConfig(workers=int(word)) for word in words), *shared)
 

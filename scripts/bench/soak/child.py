@@ -7,9 +7,8 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 
@@ -23,9 +22,10 @@ _SHOWN = 300  # letters of the last line
 _REAPED = 300.0  # workers of a killed command end by themselves within this [s]
 
 
-def command(name: str) -> str:
-    """Return the path of a command that is installed beside this Python."""
-    return str(Path(sys.executable).with_name(f"handrail-{name}"))
+def words_of(text: str, *places: object) -> list[str]:
+    """Return the words of a command that is installed beside this Python, each place in its `{}`."""
+    name, *others = (word.format(*places) for word in text.split())
+    return [str(Path(sys.executable).with_name(f"handrail-{name}")), *others]
 
 
 def hear_signals() -> None:
@@ -44,12 +44,11 @@ class Child:
     """
 
     def __init__(self, words: list[str], folder: Path, name: str) -> None:
-        self._faults = folder / f"{name}.faults"
-        self._log = folder / f"{name}.log"
+        self._faults, self._log = folder / f"{name}.faults", folder / f"{name}.log"
         self.set()
         paths = os.pathsep.join(filter(None, (str(HOOK), os.environ.get("PYTHONPATH", ""))))
         settings = {"PYTHONPATH": paths, "HANDRAIL_SOAK": str(self._faults), "HF_HUB_OFFLINE": "1"}
-        self._process = subprocess.Popen(
+        self._process = psutil.Popen(
             [*_LAST, *words],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,  # a file would suffer the faults too
@@ -57,10 +56,10 @@ class Child:
             env={"MUJOCO_GL": "egl"} | os.environ | settings,
             start_new_session=True,
         )
-        self.pid = self._process.pid
-        self.begun = time.monotonic()
-        self._listener = threading.Thread(target=self._listen, daemon=True)
-        self._listener.start()
+        self.pid, self.begun = self._process.pid, time.monotonic()
+        with open(self._log, "ab") as log:  # its own session hears no signal that is meant for the command
+            copies = {"stdin": self._process.stdout, "stdout": log, "start_new_session": True}
+            self._listener = subprocess.Popen(["cat"], **copies)
 
     @property
     def runs(self) -> bool:
@@ -71,17 +70,26 @@ class Child:
     def workers(self) -> list[int]:
         """The processes that its own processes have begun: those forked from its server."""
         with suppress(psutil.Error):
-            children = psutil.Process(self.pid).children()
-            return [worker.pid for child in children for worker in child.children()]
+            return [worker.pid for child in self._process.children() for worker in child.children()]
         return []
 
     @property
     def spent(self) -> float:
         """The processor's time that the command has used, its workers left out [s]."""
         with suppress(psutil.Error):
-            times = psutil.Process(self.pid).cpu_times()
-            return times.user + times.system
+            return sum(self._process.cpu_times()[:2])
         return 0.0
+
+    @property
+    def output(self) -> str:
+        """Everything that it printed."""
+        return self._log.read_text(errors="replace") if self._log.exists() else ""
+
+    @property
+    def last_line(self) -> str:
+        """The last line of the output."""
+        lines = [line.strip() for line in self.output.replace("\r", "\n").splitlines() if line.strip()]
+        return lines[-1][-_SHOWN:] if lines else ""
 
     def set(self, **faults: float) -> None:
         """Set the faults of its disk and its clock from now on: `delay` [s], `shift` [s]."""
@@ -97,38 +105,29 @@ class Child:
 
     def end(self, patience: float) -> int | None:
         """Wait for its end; return its exit code, or None if it had to be killed."""
-        try:
-            return self._process.wait(patience)
-        except subprocess.TimeoutExpired:
-            send(signal.SIGKILL, *session(self.pid))
-            self._process.wait()
-            return None
-        finally:
-            self._listener.join(_MOMENT * 50)  # processes that it leaves behind may hold the other end
+        with suppress(psutil.TimeoutExpired, subprocess.TimeoutExpired):
+            code = self._process.wait(patience)
+            with suppress(subprocess.TimeoutExpired):  # processes that it leaves behind hold the other end
+                self._listener.wait(1.0)
+            return code
+        send(signal.SIGKILL, *session(self.pid))
+        self._process.wait()
+        return None
 
-    def orphans(self) -> int:
-        """Return how many of its processes are left a while after its end; they are killed then."""
+    def complaints(self, code: int | None, codes: Collection[int]) -> tuple[list[str], int]:
+        """Return what is wrong with its end, and how many processes it left behind; they are killed then."""
         wait_until(lambda: not session(self.pid), _REAPED)
-        left = session(self.pid)
-        send(signal.SIGKILL, *left)
-        return len(left)
-
-    @property
-    def output(self) -> str:
-        """Everything that it printed."""
-        return self._log.read_text(errors="replace") if self._log.exists() else ""
-
-    @property
-    def last_line(self) -> str:
-        """The last line of the output."""
-        lines = [line.strip() for line in self.output.replace("\r", "\n").splitlines() if line.strip()]
-        return lines[-1][-_SHOWN:] if lines else ""
-
-    def _listen(self) -> None:
-        assert self._process.stdout
-        with open(self._log, "ab", buffering=0) as file:
-            while data := os.read(self._process.stdout.fileno(), 65_536):
-                file.write(data)
+        send(signal.SIGKILL, *(left := session(self.pid)))
+        found = []
+        if code is None:
+            found.append("the command did not end by itself")
+        elif code not in codes:
+            found.append(f"exit code {code}, expected {codes}: {self.last_line}")
+        if "Traceback (most recent call last)" in self.output:
+            found.append(f"a traceback: {self.last_line}")
+        if left:
+            found.append(f"{len(left)} processes were left behind")
+        return found, len(left)
 
 
 def session(leader: int) -> list[int]:

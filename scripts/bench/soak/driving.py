@@ -9,7 +9,7 @@ import re
 import signal
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import psutil
 from websockets.exceptions import WebSocketException
 
 from handrail.scripts.bench.page import Page
-from handrail.scripts.bench.soak.child import Child, command, hear_signals, send, wait_until
+from handrail.scripts.bench.soak.child import Child, hear_signals, send, wait_until, words_of
 from handrail.scripts.bench.soak.notes import DRIVING, MEMORY, next_number, note
 
 _EVERY = 20.0  # between two looks at the memory [s]
@@ -110,8 +110,8 @@ class DrivenHours:
     def __init__(self, out: Path, first: int) -> None:
         self._out, self._number = out, first
         self._root = out / f"driven-{first}"
-        words = [command("cockpit"), str(self._root), "--cockpit.no_open", "--cockpit.port", "0"]
-        self._child = Child([*words, "--dataset.num_episodes", "1000000"], out, f"driven-{first}")
+        words = "cockpit {} --cockpit.no_open --cockpit.port 0 --dataset.num_episodes 1000000"
+        self._child = Child(words_of(words, self._root), out, f"driven-{first}")
         self._rng = np.random.default_rng([7, first])
         self._sums: dict[str, str] = {}
         self._looked = 0.0
@@ -121,26 +121,20 @@ class DrivenHours:
         # the first time on a computer compiles the controller
         wait_until(lambda: "Ready." in self._child.output or not self._child.runs, _START)
         page = WanderingPage(re.findall(r"Drive at (\S+)", self._child.output)[-1], self._rng)
+        faults = self._faults(page)
         try:
             while time.monotonic() < until and self._child.runs:
                 self._drive(page, min(until, time.monotonic() + self._rng.uniform(*_BETWEEN)))
                 if time.monotonic() < until and self._child.runs:
-                    self._befall(page)
+                    name = str(self._rng.choice(list(faults)))
+                    self._befall(page, name, faults[name])
         finally:
             page.close()
             self._end()
 
-    def _drive(self, page: WanderingPage, until: float, saved: float = np.inf) -> None:
-        """Drive until a time, the end of the recording, or more episodes are saved."""
-        while time.monotonic() < until and self._child.runs and page.saved <= saved:
-            page.turn()
-            if time.monotonic() > self._looked + _EVERY:
-                self._look_at_memory(page)
-
-    def _befall(self, page: WanderingPage) -> None:
-        """Let something happen; note whether it drives again, and that nothing saved is another."""
+    def _faults(self, page: WanderingPage) -> Mapping[str, Callable[[], object]]:
         uniform = self._rng.uniform
-        faults = {
+        return {
             "page silent for seconds": lambda: time.sleep(uniform(0.5, 6.0)),
             "page closed and opened again": page.reopen,
             "page answers seconds late": lambda: page.lag(uniform(1.0, 4.0)),
@@ -152,9 +146,18 @@ class DrivenHours:
             "clock jumps forwards": lambda: self._while(page, shift=uniform(60.0, 3e7)),
             "clock jumps backwards": lambda: self._while(page, shift=-uniform(60.0, 3e7)),
         }
-        name = str(self._rng.choice(list(faults)))
+
+    def _drive(self, page: WanderingPage, until: float, saved: float = np.inf) -> None:
+        """Drive until a time, the end of the recording, or more episodes are saved."""
+        while time.monotonic() < until and self._child.runs and page.saved <= saved:
+            page.turn()
+            if time.monotonic() > self._looked + _EVERY:
+                self._look_at_memory(page)
+
+    def _befall(self, page: WanderingPage, name: str, strike: Callable[[], object]) -> None:
+        """Let something happen; note whether it drives again, and that nothing saved is another."""
         before, began = self._known(), time.monotonic()
-        faults[name]()
+        strike()
         saved = page.saved
         self._drive(page, time.monotonic() + _BACK, saved)
         complaints = [] if page.saved > saved else ["it did not drive again"]
@@ -190,7 +193,7 @@ class DrivenHours:
         return known
 
     def _note(self, fault: str, before: dict[str, str], complaints: list[str], **row: Any) -> None:
-        now = self._known(anew=fault == "Ctrl-C at the end")
+        now = self._known(anew="code" in row)
         lost = [each for each in before if now.get(each) != before[each]]
         complaints += [f"{each} was saved and is gone or another" for each in lost]
         row |= {"round": self._number, "fault": fault, "work": "drive in the browser, one process"}
@@ -213,16 +216,12 @@ class DrivenHours:
         if ran:
             send(signal.SIGINT, self._child.pid)
         code = self._child.end(_PATIENCE)
-        orphans = self._child.orphans()
-        complaints = [] if code == 130 else [f"exit code {code}: {self._child.last_line}"]
-        complaints += [f"{orphans} processes were left behind"] if orphans else []
-        complaints += ["a traceback"] if "Traceback" in self._child.output else []
-        repair = Child([command("edit"), "repair", str(self._root)], self._out, f"{self._root.name}-repair")
+        complaints, _ = self._child.complaints(code, {130})
+        repair = Child(words_of("edit repair {}", self._root), self._out, f"{self._root.name}-repair")
         if repair.end(_PATIENCE * 5) != 0 or "nothing to repair" not in repair.output:
             complaints.append(repair.last_line)
-        self._note(
-            "Ctrl-C at the end", before, complaints, seconds=0.0, struck=ran, code=code, said=repair.last_line
-        )
+        how = {"seconds": 0.0, "struck": ran, "code": code, "said": repair.last_line}
+        self._note("Ctrl-C at the end", before, complaints, **how)
 
 
 def _episodes(files: Iterable[str]) -> int:

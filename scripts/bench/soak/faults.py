@@ -1,25 +1,27 @@
 """The faults: what befalls a command at some moment, and what of it is taken back afterwards."""
 
-import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 from handrail.scripts.bench.soak.child import Child, send, session, wait_until
+from handrail.scripts.bench.soak.ray_nodes import lose_node
 
 KILLED = {-signal.SIGKILL}
-CLUSTER = "cluster.json"  # in the folder of work that is done on a cluster
 _FINE, _FAILED = {0}, {0, 1, 2}  # a failure that comes too late for the command to notice is none
 _FAR = 400 * 86_400.0  # of a clock that jumps [s]
 _BEGUN = 600.0  # a command has workers by then [s]
+_DISK = 48  # size of the small one [MB]
 
 Strike = Callable[[Child, Path, np.random.Generator], object]
 
@@ -34,14 +36,29 @@ class Fault:
     """Lets it happen to a command whose work is in a folder."""
     codes: set[int]
     """Exit codes that a command may have after it."""
-    heal: Callable[[Path], None] = lambda folder: None
+    heal: Callable[[Path], object] = lambda folder: None
     """Takes it back, once the command has ended."""
-    workers: bool = False
-    """Whether it needs a command with workers."""
-    disk: bool = False
-    """Whether it needs a small disk of its own."""
-    cluster: bool = False
-    """Whether it needs work on a cluster."""
+    needs: str = ""
+    """A command with `workers`, a small `disk` of its own, or work on a `cluster`."""
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether it can be made here: a disk of its own needs root, a cluster needs Ray."""
+        if self.needs == "disk":
+            return os.geteuid() == 0 and shutil.which("mount") is not None
+        return self.needs != "cluster" or find_spec("ray") is not None
+
+    @contextmanager
+    def disk(self, path: Path) -> Iterator[Path]:
+        """Provide a folder; on a small disk of its own, where that is needed."""
+        path.mkdir()
+        if self.needs == "disk":
+            subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={_DISK}m", "tmpfs", str(path)], check=True)
+        try:
+            yield path
+        finally:
+            if self.needs == "disk":
+                subprocess.run(["umount", "-l", str(path)])
 
 
 def _to_command(number: int) -> Strike:
@@ -96,16 +113,12 @@ def _lock_folders(folder: Path, sign: str = "+") -> None:
     subprocess.run(["chattr", f"{sign}i", *map(str, folders)], capture_output=True)
 
 
-def _lose_node(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    send(signal.SIGUSR1, json.loads((folder / CLUSTER).read_text())["pid"])
-
-
 FAULTS = (
     Fault("SIGKILL of the command", _to_command(signal.SIGKILL), KILLED),
     Fault("SIGKILL of the command and all its workers", _to_all(signal.SIGKILL), KILLED),
     Fault("SIGKILL while the disk is slow", _kill_slowly, KILLED),
-    Fault("SIGKILL of one worker", _kill_worker, _FINE, workers=True),
-    Fault("a lost Ray node", _lose_node, _FINE, cluster=True),
+    Fault("SIGKILL of one worker", _kill_worker, _FINE, needs="workers"),
+    Fault("a lost Ray node", lambda child, folder, rng: lose_node(folder), _FINE, needs="cluster"),
     Fault("SIGTERM", _to_command(signal.SIGTERM), {130}),
     Fault("the terminal is closed (SIGHUP)", _to_all(signal.SIGHUP), {-signal.SIGHUP}),
     Fault("Ctrl-C", _to_all(signal.SIGINT), {130}),
@@ -114,7 +127,7 @@ FAULTS = (
     Fault("slow disk", lambda child, _, rng: child.set(delay=rng.uniform(0.1, 0.6)), _FINE),
     Fault("clock jumps forwards", lambda child, _, rng: child.set(shift=rng.uniform(60.0, _FAR)), _FINE),
     Fault("clock jumps backwards", lambda child, _, rng: child.set(shift=-rng.uniform(60.0, _FAR)), _FINE),
-    Fault("full disk", _fill, _FAILED, lambda folder: _ballast(folder).unlink(missing_ok=True), disk=True),
+    Fault("full disk", _fill, _FAILED, lambda folder: _ballast(folder).unlink(missing_ok=True), needs="disk"),
     Fault(
         "files that cannot grow",
         lambda child, _, rng: child.limit(resource.RLIMIT_FSIZE, int(rng.integers(0, 20_000))),

@@ -1,4 +1,4 @@
-"""The notes of the soak: a line of JSON a round, whole whatever happens; and their tables on a page."""
+"""The notes of the soak: a line of JSON a fault, whole whatever happens; and their tables on a page."""
 
 import json
 import os
@@ -17,7 +17,7 @@ from handrail.datasets.presentation.table import Table
 ROUNDS, DRIVING, MEMORY = "rounds.jsonl", "driving.jsonl", "memory.jsonl"
 Row = dict[str, Any]
 _HEADINGS = (
-    *("fault", "how often", "during", "the command then", "saved before", "lost", "complaints"),
+    *("fault", "how often", "saved before", "lost", "complaints"),
     *("mended by handrail-edit repair", "finished by the same command", "seconds"),
 )
 _PLACES = (  # on the computer where it was done
@@ -25,8 +25,6 @@ _PLACES = (  # on the computer where it was done
 )
 _SHARES = (0.02, 0.25, 0.5, 0.75, 1.0)  # of a drive, at which memory is shown
 _THIN = 15  # of as many looks at the memory one goes to the JSON file
-_ENDS = {0: "went on by itself", None: "had to be killed"}
-_ENDS |= {-9: "killed", -15: "ended by SIGTERM", -1: "hung up"}
 _PROGRAMS, _MEASURES = ("recording", "server"), ("memory", "open files", "threads")
 
 
@@ -60,49 +58,36 @@ def write_tables(out: Path, page: Path) -> None:
     """Write the tables of a folder into a page, and everything into the JSON beside it."""
     kept = {Path(name).stem: read(out / name) for name in (ROUNDS, DRIVING, MEMORY)}
     rounds, drives = ([row for row in kept[name] if row.get("struck")] for name in ("rounds", "driving"))
+    late = sum(not row.get("struck") and "broken" not in row for row in kept["rounds"])
     parts = {
-        "sum": _sum(rounds, drives, kept["rounds"]),
-        "rounds": markdown_table(_by_fault(rounds, sum)),
-        "drives": markdown_table(_by_fault(drives, max)),  # of one recording, which had saved ever more
-        "memory": markdown_table(_memory(kept["memory"])),
+        "sum": _sum(rounds, drives, late),
+        "rounds": _by_fault(rounds, sum),
+        "drives": _by_fault(drives, max),  # of one recording, which had saved ever more
+        "memory": _memory(kept["memory"]),
     }
-    for name, text in parts.items():
-        write_part(page, "Hours of faults", name, text)
+    for name, table in parts.items():
+        write_part(page, "Hours of faults", name, markdown_table(table))
     kept["memory"] = kept["memory"][::_THIN]
     lines = [f'"{name}": [\n{",\n".join(map(json.dumps, rows))}\n]' for name, rows in kept.items()]
     page.with_suffix(".json").write_text(re.sub(_PLACES, "", "{" + ",\n".join(lines) + "}\n"))
 
 
-def _by_fault(rows: Sequence[Row], all_of: Callable[[Iterable[int]], int]) -> Table:
-    faults = sorted({row["fault"] for row in rows})
-    return Table(
-        _HEADINGS, [[each, *_cells([r for r in rows if r["fault"] == each], all_of)] for each in faults]
-    )
-
-
-def _cells(rows: Sequence[Row], all_of: Callable[[Iterable[int]], int]) -> list[str]:
-    goes = [row for row in rows if row.get("goes")]
-    return [
-        str(len(rows)),
-        _counted(row["work"].split(",")[0] for row in rows),
-        _counted(map(_end, rows)),
-        str(all_of(row["saved_before"] for row in rows)),
-        str(sum(row["lost"] for row in rows)),
-        str(sum(bool(row["complaints"]) for row in rows)),
-        str(sum(bool(row.get("mended")) for row in rows)),
-        f"{sum(row['last_code'] in (0, 2) for row in goes)} of {len(goes)}",
-        f"{statistics.median(row['seconds'] for row in rows):.0f}",
-    ]
-
-
-def _end(row: Row) -> str:
-    if "code" not in row:
-        return "did not drive on" if row["complaints"] else "drove on"
-    return _ENDS.get(row["code"], f"ended with {row['code']}")
-
-
-def _counted(names: Iterable[str]) -> str:
-    return ", ".join(f"{name} ({count})" for name, count in Counter(names).most_common())
+def _by_fault(all_rows: Sequence[Row], all_of: Callable[[Iterable[int]], int]) -> Table:
+    lines = []
+    for fault in sorted({row["fault"] for row in all_rows}):
+        rows = [row for row in all_rows if row["fault"] == fault]
+        again = [row for row in rows if row.get("goes")]
+        numbers = (
+            len(rows),
+            all_of(row["saved_before"] for row in rows),
+            sum(row["lost"] for row in rows),
+            sum(bool(row["complaints"]) for row in rows),
+            sum(bool(row.get("mended")) for row in rows),
+            f"{sum(row['last_code'] in (0, 2) for row in again)} of {len(again)}",
+            f"{statistics.median(row['seconds'] for row in rows):.0f}",
+        )
+        lines.append([fault, *map(str, numbers)])
+    return Table(_HEADINGS, lines)
 
 
 def _memory(rows: Sequence[Row]) -> Table:
@@ -118,9 +103,8 @@ def _memory(rows: Sequence[Row]) -> Table:
     return Table(("hours", "saved", *(f"{each}: {of}" for each in _PROGRAMS for of in _MEASURES)), lines)
 
 
-def _sum(rounds: Sequence[Row], drives: Sequence[Row], every: Sequence[Row]) -> str:
+def _sum(rounds: Sequence[Row], drives: Sequence[Row], late: int) -> Table:
     both = [*rounds, *drives]
-    late = sum(not row.get("struck") and "broken" not in row for row in every)
     numbers = {
         "faults": len(both),
         "in rounds": len(rounds),
@@ -132,4 +116,4 @@ def _sum(rounds: Sequence[Row], drives: Sequence[Row], every: Sequence[Row]) -> 
         "lost": sum(row["lost"] for row in both),
         "with a complaint": sum(bool(row["complaints"]) for row in both),
     }
-    return markdown_table(Table(tuple(numbers), [[str(value) for value in numbers.values()]]))
+    return Table(tuple(numbers), [list(map(str, numbers.values()))])

@@ -1,19 +1,14 @@
 """One round: a piece of work begins, something befalls it, and then it is looked at and goes on."""
 
-import os
 import shutil
-import subprocess
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from handrail.datasets.recording.repair import repair
-from handrail.scripts.bench.soak.child import Child, command, wait_until
+from handrail.scripts.bench.soak.child import Child, wait_until, words_of
 from handrail.scripts.bench.soak.faults import FAULTS, Fault
 from handrail.scripts.bench.soak.whole import Saved
 from handrail.scripts.bench.soak.work import Work, Workshop, any_work
@@ -22,7 +17,6 @@ _PATIENCE = 1800.0  # for the end of a command [s]
 _ARRIVAL = 900.0  # for the moment of the fault [s]
 _STARTS = 8.0  # of the processor's time; a command has begun to work by then [s]
 _EPISODE = 1.5  # [s]
-_DISK = 48  # size of the small one [MB]
 _GOES = 4  # commands after a fault
 
 
@@ -39,21 +33,17 @@ def run_round(
         fault: the only one wanted; any when empty.
         work: the only kind of work wanted; any when empty.
     """
-    rng = np.random.default_rng([seed, number])
-    chosen = [each for each in FAULTS if fault in each.name and _is_possible(each)]
+    rng, begun = np.random.default_rng([seed, number]), time.monotonic()
+    chosen = [each for each in FAULTS if fault in each.name and each.is_possible]
     struck = chosen[int(rng.integers(len(chosen)))]
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    begun = time.monotonic()
-    with _disk(folder / "disk", struck.disk) as disk:
+    with struck.disk(folder / "disk") as disk:
         place = disk / "work"
         place.mkdir()
-        piece = any_work(place, workshop, rng, struck, work)
-        row = {"round": number, "seed": seed, "fault": struck.name, "work": piece.name}
-        try:
+        with any_work(place, workshop, rng, struck, work) as piece:
+            row = {"round": number, "seed": seed, "fault": struck.name, "work": piece.name}
             row |= _Round(piece, struck, folder, rng).run()
-        finally:
-            piece.close()
     row["seconds"] = round(time.monotonic() - begun, 1)
     if not row["complaints"]:
         shutil.rmtree(folder, ignore_errors=True)
@@ -80,11 +70,11 @@ class _Round:
             work.code = code = child.end(_PATIENCE)
         finally:
             fault.heal(work.folder)
-        orphans = self._judge_end(child, code, fault.codes if struck else {0})
+        orphans = self._judge(child, code, fault.codes if struck else {0})
         after = self._look(before, "after the fault")
         if work.root and self._rng.random() < 0.5:
-            repairing = self._begin([command("edit"), "repair", str(work.root)])
-            self._judge_end(repairing, repairing.end(_PATIENCE), {0})
+            repairing = self._begin(words_of("edit repair {}", work.root))
+            self._judge(repairing, repairing.end(_PATIENCE), {0})
             mended = "" if "nothing to repair" in repairing.output else repairing.last_line
         goes, last = self._go_on()
         final = self._look(after, "in the end")
@@ -99,7 +89,7 @@ class _Round:
             "at": round(when, 1),
             "saved_before": len(before),
             "saved_after": len(after),
-            "lost": sum(1 for each in before if final.get(each) != work.wanted.get(each)),
+            "lost": sum(final.get(each) != work.wanted.get(each) for each in before),
             "code": code,
             "said": child.last_line,
             "mended": mended,
@@ -125,17 +115,10 @@ class _Round:
             time.sleep(self._rng.uniform(0.0, _EPISODE))
         return child.runs
 
-    def _judge_end(self, child: Child, code: int | None, codes: set[int]) -> int:
+    def _judge(self, child: Child, code: int | None, codes: set[int]) -> int:
         """Note an end that may not be; return how many processes were left behind."""
-        orphans = child.orphans()
-        if code is None:
-            self._complaints.append("the command did not end by itself")
-        elif code not in codes:
-            self._complaints.append(f"exit code {code}, expected {codes}: {child.last_line}")
-        if "Traceback (most recent call last)" in child.output:
-            self._complaints.append(f"a traceback: {child.last_line}")
-        if orphans:
-            self._complaints.append(f"{orphans} processes were left behind")
+        complaints, orphans = child.complaints(code, codes)
+        self._complaints += complaints
         return orphans
 
     def _look(self, before: Saved, when: str) -> Saved:
@@ -155,25 +138,5 @@ class _Round:
             child = self._begin(words)
             self._work.code = code = child.end(_PATIENCE)
             finished = code == 2 and "is finished now" in child.output
-            self._judge_end(child, 0 if finished else code, {0})
+            self._judge(child, 0 if finished else code, {0})
         return goes, code
-
-
-@contextmanager
-def _disk(path: Path, small: bool) -> Iterator[Path]:
-    """Provide a folder; on a small disk of its own, where that is wanted."""
-    path.mkdir()
-    if small:
-        subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={_DISK}m", "tmpfs", str(path)], check=True)
-    try:
-        yield path
-    finally:
-        if small:
-            with suppress(subprocess.SubprocessError):
-                subprocess.run(["umount", "-l", str(path)], check=True)
-
-
-def _is_possible(fault: Fault) -> bool:
-    """Return whether a fault can be made here: a disk of its own needs root, a cluster needs Ray."""
-    can_mount = os.geteuid() == 0 and shutil.which("mount") is not None
-    return (can_mount or not fault.disk) and (find_spec("ray") is not None or not fault.cluster)

@@ -1,12 +1,9 @@
-"""A piece of work: what is done, what of it is saved, and what is wanted in the end."""
+"""A piece of work: a command, what of it is saved, and what is wanted in the end."""
 
-import json
-import os
 import shutil
-import signal
 import subprocess
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +11,16 @@ from filelock import FileLock
 
 from handrail.datasets.format.episode_rows import count_rows, row_files
 from handrail.datasets.format.layout import Layout
-from handrail.scripts.bench.soak.child import Child, command, send, session, wait_until
-from handrail.scripts.bench.soak.faults import CLUSTER, KILLED, Fault
+from handrail.scripts.bench.soak.child import Child, words_of
+from handrail.scripts.bench.soak.faults import KILLED, Fault
+from handrail.scripts.bench.soak.ray_nodes import cluster
 from handrail.scripts.bench.soak.whole import Saved, lines_of, rollouts_of, saved_by, saved_in
 
-os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.0.0.1 at another address
-_CLUSTER_STARTS, _CLUSTER_ENDS = 600.0, 120.0  # [s]
 _PATIENCE = 1800.0  # [s]
-_TINY = ("chunk_size=8", "n_action_steps=4", "dim_model=32", "n_heads=2", "dim_feedforward=32")
+_TRAIN = (
+    "train {0}/d --output {0}/p --steps 6 --batch_size 8 --policy_options"
+    " chunk_size=8 n_action_steps=4 dim_model=32 n_heads=2 dim_feedforward=32"
+)
 _RAY = 0.2  # share of the kills that befall a recording on a cluster
 _EPISODES, _ROLLOUTS = 12, 6
 _RECIPES = {  # recordings, by name
@@ -30,14 +29,14 @@ _RECIPES = {  # recordings, by name
     "tray": "--task tray --mode ee --time_limit 2.0 --seed 5",
     "pictures": "--task reach --time_limit 1.0 --seed 6 --cameras wrist --image_size 64",
 }
-_EDITS = {  # command, `{}` for the folder; the name there of its result
-    "pack in place": ("edit pack {}/d", "d"),
-    "pack into another folder": ("edit pack {}/d --output {}/n", "n"),
-    "merge": ("edit merge {}/d {}/e --output {}/n", "n"),
-    "merge into the first": ("edit merge {}/d {}/e --output {}/d", "d"),
-    "edit delete": ("edit delete {}/d --episodes 1 3 --in_place", "d"),
-    "edit trim": ("edit trim {}/d --in_place", "d"),
-    "edit keep": ("edit keep {}/d --episodes 2-5 --output {}/n", "n"),
+_EDITS = {  # command, `{0}` for the folder; the name there of its result
+    "pack in place": ("edit pack {0}/d", "d"),
+    "pack into another folder": ("edit pack {0}/d --output {0}/n", "n"),
+    "merge": ("edit merge {0}/d {0}/e --output {0}/n", "n"),
+    "merge into the first": ("edit merge {0}/d {0}/e --output {0}/d", "d"),
+    "edit delete": ("edit delete {0}/d --episodes 1 3 --in_place", "d"),
+    "edit trim": ("edit trim {0}/d --in_place", "d"),
+    "edit keep": ("edit keep {0}/d --episodes 2-5 --output {0}/n", "n"),
 }
 _KINDS = {"record": 5, "record_2": 4, "resume": 2, "packed": 2, "edit": 4, "evaluate": 1, "replay": 1}
 
@@ -55,25 +54,24 @@ class Workshop:
 
     def recorded(self, recipe: str, episodes: int = _EPISODES) -> Path:
         """Return a dataset as it is recorded when nothing disturbs."""
-        words = f"record {{}}/d {_RECIPES[recipe]} --dataset.num_episodes {episodes}"
+        words = f"record {{0}}/d {_RECIPES[recipe]} --dataset.num_episodes {episodes}"
         return self.made(f"{recipe}-{episodes}", words, {}, "d")
 
     def packed(self, recipe: str, episodes: int) -> Path:
         """Return such a dataset, packed."""
         source = {"d": self.recorded(recipe, episodes)}
-        return self.made(f"{recipe}-{episodes}-packed", "edit pack {}/d --output {}/n", source, "n")
+        return self.made(f"{recipe}-{episodes}-packed", "edit pack {0}/d --output {0}/n", source, "n")
 
     def policy(self) -> Path:
         """Return a policy, trained for a moment."""
-        words = f"train {{}}/d --output {{}}/p --steps 6 --batch_size 8 --policy_options {' '.join(_TINY)}"
-        return self.made("policy", words, {"d": self.recorded("reach_ee")}, "p")
+        return self.made("policy", _TRAIN, {"d": self.recorded("reach_ee")}, "p")
 
     def made(self, name: str, words: str, copied: dict[str, Path], result: str) -> Path:
         """Return what a command makes of copies of datasets, when nothing disturbs.
 
         Args:
             name: of it.
-            words: of the command, its name first; `{}` stands for the folder of the copies.
+            words: of the command, its name first; `{0}` stands for the folder of the copies.
             copied: datasets, by their names there.
             result: the name there of what is made.
         """
@@ -84,16 +82,11 @@ class Workshop:
                 place.mkdir()
                 for each, source in copied.items():
                     shutil.copytree(source, place / each)
-                child = Child(_command(words, place), self._folder, name)
+                child = Child(words_of(words, place), self._folder, name)
                 if child.end(_PATIENCE) != 0:
                     raise subprocess.SubprocessError(f"{words}: {child.output}")
                 (place / "done").touch()
         return place / result
-
-
-def _command(words: str, folder: Path) -> list[str]:
-    name, *others = (word.format(folder) for word in words.split())
-    return [command(name), *others]
 
 
 class Work:
@@ -102,7 +95,7 @@ class Work:
     Args:
         name: in the table.
         place: what it makes.
-        words: of the command; `{}` stands for the folder.
+        words: of the command; `{0}` stands for the folder.
         wanted: what is to be there in the end.
         before: what is there in the beginning.
         read: what is saved in a place.
@@ -125,7 +118,7 @@ class Work:
     def words(self) -> list[str] | None:
         """Return the command that a user would give now; None where everything is done."""
         done = self.code == 0 or self.saved() == self.wanted != self._before
-        return None if done and not self.progress() else _command(self._words, self.folder)
+        return None if done and not self.progress() else words_of(self._words, self.folder)
 
     def progress(self) -> int:
         """Return how far it is: quick, and whatever runs."""
@@ -138,9 +131,8 @@ class Work:
 
     def saved(self) -> Saved:
         """Return what is saved now; raises if a saved piece cannot be read."""
-        if not self.place.exists() and self._hidden("old").exists():
-            return self._read(self._hidden("old"))  # between two names: the next command finishes it
-        return self._read(self.place)
+        between = not self.place.exists() and self._hidden("old").exists()  # the next command finishes it
+        return self._read(self._hidden("old") if between else self.place)
 
     def lost(self, before: Saved, now: Saved) -> list[str]:
         """Return what was saved and is not any more, and what is not as it would be undisturbed."""
@@ -152,18 +144,15 @@ class Work:
         """The dataset that a user may repair."""
         return self.place if Layout(self.place).manifest.is_file() else None
 
-    def close(self) -> None:
-        """End what it needs."""
-
     def _hidden(self, kind: str) -> Path:
         return self.place.with_name(f".{self.place.name}.{kind}")
 
 
 class GrowingWork(Work):
-    """Work that saves piece by piece, and goes on: recordings and evaluations."""
+    """Work that saves piece by piece, and goes on: an evaluation."""
 
     def words(self) -> list[str] | None:
-        return None if self.saved() == self.wanted else _command(self._words, self.folder)
+        return None if self.saved() == self.wanted else words_of(self._words, self.folder)
 
     def progress(self) -> int:
         return len(self.saved())
@@ -178,7 +167,7 @@ class GrowingWork(Work):
 
 
 class RecordingWork(GrowingWork):
-    """`handrail-record`, with one process or several, anew or as an addition."""
+    """`handrail-record`, with one process or several, on a cluster, anew or as an addition."""
 
     _given = ""
 
@@ -189,41 +178,17 @@ class RecordingWork(GrowingWork):
                 return None
             more = "--resume " if self.root else ""
             self._given = f" {more}--dataset.num_episodes {_EPISODES - there}"
-        return _command(self._words + self._given, self.folder)
+        return words_of(self._words + self._given, self.folder)
 
     def progress(self) -> int:
         return lines_of(self.place)
 
 
-class RayRecording(RecordingWork):
-    """`handrail-record --ray` on a cluster of two computers, both here."""
-
-    def __init__(self, folder: Path, recipe: str, wanted: Saved) -> None:
-        file, log = folder / CLUSTER, folder / "cluster.log"
-        words = [sys.executable, str(Path(__file__).with_name("ray_nodes.py")), str(file)]
-        with open(log, "w") as output:
-            self._cluster = subprocess.Popen(words, stdout=output, stderr=output, start_new_session=True)
-        wait_until(lambda: file.exists() or self._cluster.poll() is not None, _CLUSTER_STARTS)
-        if not file.exists():
-            self.close()
-            raise TimeoutError(f"no Ray cluster: {log.read_text()[-300:]}")
-        address = json.loads(file.read_text())["address"]
-        words = f"record {{}}/d {_RECIPES[recipe]} --ray {address}"
-        super().__init__("record --ray", folder / "d", words, wanted, read=saved_by)
-
-    def close(self) -> None:
-        self._cluster.terminate()
-        try:
-            self._cluster.wait(_CLUSTER_ENDS)
-        except subprocess.TimeoutExpired:
-            send(signal.SIGKILL, *session(self._cluster.pid))
-            self._cluster.wait()
-
-
+@contextmanager
 def any_work(
     folder: Path, workshop: Workshop, rng: np.random.Generator, fault: Fault, only: str = ""
-) -> Work:
-    """Return a piece of work.
+) -> Iterator[Work]:
+    """Give a piece of work.
 
     Args:
         folder: for it, empty.
@@ -233,14 +198,30 @@ def any_work(
         only: the only kind that is wanted; any when empty.
     """
     recipe = str(rng.choice(list(_RECIPES)))
-    if fault.cluster or (not only and rng.random() < _RAY and fault.codes >= KILLED):
-        return RayRecording(folder, recipe, saved_in(workshop.recorded(recipe)))
-    kinds = {only: 1} if only else {"record_2": 5, "evaluate": 1} if fault.workers else _KINDS
+    ray = fault.needs == "cluster" or (not only and rng.random() < _RAY and fault.codes >= KILLED)
+    with cluster(folder) if ray else nullcontext() as address:
+        yield _work(folder, workshop, rng, fault.needs == "workers", only, recipe, address)
+
+
+def _work(
+    folder: Path,
+    workshop: Workshop,
+    rng: np.random.Generator,
+    workers: bool,
+    only: str,
+    recipe: str,
+    address: str | None,
+) -> Work:
+    record = f"record {{0}}/d {_RECIPES[recipe]}"
+    if address:
+        wanted, words = saved_in(workshop.recorded(recipe)), f"{record} --ray {address}"
+        return RecordingWork("record --ray", folder / "d", words, wanted, read=saved_by)
+    kinds = {only: 1} if only else {"record_2": 5, "evaluate": 1} if workers else _KINDS
     share = np.array(list(kinds.values()), float)
     kind = str(rng.choice(list(kinds), p=share / share.sum()))
-    shared = " --workers 2" if fault.workers or kind == "record_2" or rng.random() < 0.2 else ""
+    shared = " --workers 2" if workers or kind == "record_2" or rng.random() < 0.2 else ""
     if kind == "evaluate":
-        words = f"evaluate {workshop.policy()} --episodes {_ROLLOUTS} --time_limit 1 --json {{}}/e.json"
+        words = f"evaluate {workshop.policy()} --episodes {_ROLLOUTS} --time_limit 1 --json {{0}}/e.json"
         wanted = rollouts_of(workshop.made(f"evaluation-{_ROLLOUTS}", words, {}, "e.json"))
         return GrowingWork(f"evaluate{shared}", folder / "e.json", words + shared, wanted, read=rollouts_of)
     if kind in ("edit", "replay"):
@@ -251,15 +232,16 @@ def any_work(
         source = workshop.packed(recipe, had) if kind == "packed" else workshop.recorded(recipe, had)
         shutil.copytree(source, folder / "d")
         name += " --resume" + (", packed before" if kind == "packed" else "")
-    wanted, words = saved_in(workshop.recorded(recipe)), f"record {{}}/d {_RECIPES[recipe]}{shared}"
-    return RecordingWork(name, folder / "d", words, wanted, read=saved_by)
+    return RecordingWork(
+        name, folder / "d", record + shared, saved_in(workshop.recorded(recipe)), read=saved_by
+    )
 
 
 def _edit(folder: Path, workshop: Workshop, rng: np.random.Generator, recipe: str, kind: str) -> Work:
     name = kind if kind == "replay" else str(rng.choice(list(_EDITS)))
-    words, result = _EDITS.get(name, ("replay {}/d --episode 0", "d"))
+    words, result = _EDITS.get(name, ("replay {0}/d --episode 0", "d"))
     sources = {"d": workshop.recorded(recipe)}
-    if "{}/e" in words:
+    if "{0}/e" in words:
         sources["e"] = workshop.recorded(recipe, 4)
     for each, root in sources.items():
         shutil.copytree(root, folder / each)

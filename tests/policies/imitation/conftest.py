@@ -1,14 +1,15 @@
 """A dataset and a training that several files of tests look at, and none changes."""
 
 import pytest
+from canned import canned
 from training_helpers import tiny, write_dataset
 
 from handrail.policies.imitation.training.training import train
 
 
 @pytest.fixture(scope="session")
-def recorded(tmp_path_factory):
-    return write_dataset(tmp_path_factory.mktemp("data") / "set")
+def recorded():
+    return canned(write_dataset)
 
 
 @pytest.fixture(scope="session")

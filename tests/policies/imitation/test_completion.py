@@ -9,6 +9,7 @@ import torch
 from gymnasium.vector import SyncVectorEnv
 from lerobot.envs.factory import make_env, make_env_config
 from lerobot.envs.utils import preprocess_observation
+from lerobot.processor import PolicyProcessorPipeline
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env
@@ -47,9 +48,7 @@ def steps(interface, by=BY):
 def driven(interface, completes, seeds=(5,), fail_at=None):
     """Return the robot's states while a policy asks for the same twist all the time."""
     view, acts, completion = steps(interface)
-    config = make_env_config(
-        "handrail", task=BY.task, mode="ee"
-    )  # from which LeRobot takes the policy's size
+    config = make_env_config("handrail", task=BY.task, mode="ee")  # LeRobot takes the policy's size from it
     env = make_env(config, n_envs=len(seeds), use_async_envs=False)["handrail"][0]
     assert isinstance(env, SyncVectorEnv)
     seen, _ = env.reset(seed=list(seeds))
@@ -99,13 +98,8 @@ def test_an_episode_that_begins_again_is_the_same_again(interface):
 
     def at(time):
         numbers = shown | {"observation.time": np.array([time])}
-        view(
-            {
-                "observation": {
-                    key: torch.as_tensor(each, dtype=torch.float32)[None] for key, each in numbers.items()
-                }
-            }
-        )
+        shows = {key: torch.as_tensor(each, dtype=torch.float32)[None] for key, each in numbers.items()}
+        view({"observation": shows})
         return completion({"action": torch.full((1, 7), 0.1)})["action"].numpy()
 
     first = [at(0.0), at(0.05)]
@@ -120,11 +114,8 @@ def test_what_stands_around_becomes_numbers_and_back():
     back = from_numbers(to_numbers(there))
     assert len(back) == len(there) > 2
     for one, other in zip(there, back, strict=True):
-        assert (one.shape.kind, one.frame, one.work_surface) == (
-            other.shape.kind,
-            other.frame,
-            other.work_surface,
-        )
+        words = [(each.shape.kind, each.frame, each.work_surface) for each in (one, other)]
+        assert words[0] == words[1]
         for name in ("position", "rotation", "velocity"):
             np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=1e-6)
         np.testing.assert_allclose(one.shape.size, other.shape.size, atol=1e-6)
@@ -140,9 +131,7 @@ def test_what_cannot_be_completed_is_said(interface):
     names = ("observation.state", "observation.environment_state")
     seen = {name: torch.ones(1, size) for name, size in zip(names, sizes, strict=True)}
     view({"observation": seen | {"observation.sent": torch.zeros(1, 9)}})
-    with pytest.raises(
-        HandrailError, match=r"expected observation\.time of 1 robots, as --env.type=handrail"
-    ):
+    with pytest.raises(HandrailError, match=r"expected observation\.time of 1 robots, as --env.type=handr"):
         completion({"action": torch.zeros(1, 7)})
     with pytest.raises(HandrailError, match="fps"):
         steps(interface, dataclasses.replace(BY, fps=0))
@@ -179,11 +168,7 @@ def test_a_name_that_would_be_imported_is_refused_and_never_written(field, inter
     with pytest.raises(HandrailError, match="a file may not choose what is imported"):
         completion({"action": torch.zeros(1, 7)})
 
-    @dataclasses.dataclass
-    class Processor:
-        steps: list
-
-    _, after = with_steps(Processor([]), Processor([]), interface, strange)
-    assert [type(step) for step in after.steps] == [PolicyActionStep]
-    _, after = with_steps(Processor([]), Processor([]), interface, BY)
-    assert [type(step) for step in after.steps] == [PolicyCompletionStep]
+    pipeline = PolicyProcessorPipeline([])
+    for by, kind in ((strange, PolicyActionStep), (BY, PolicyCompletionStep)):
+        _, after = with_steps(pipeline, pipeline, interface, by)
+        assert [type(step) for step in after.steps] == [kind]

@@ -6,7 +6,6 @@ import signal
 from dataclasses import replace
 
 import pytest
-from command_helpers import command
 from policy_helpers import StandIn, checkpoint, load
 
 from handrail.collect.seeds import FIRST_SEED
@@ -21,17 +20,15 @@ from handrail.policies.imitation.evaluation.table import evaluation_table
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Checkpoints by name."""
-    root = tmp_path_factory.mktemp("policies")
+    root, picks = tmp_path_factory.mktemp("policies"), {"kind": "random", "task": "pick_place"}
     checkpoint(root / "chase")
     checkpoint(root / "chase_1", training_seed=1)
     checkpoint(root / "chase_realised", actions="realised")
     checkpoint(root / "brief", kind="still", time_limit=0.5)
-    checkpoint(root / "random", kind="random")
-    checkpoint(root / "torch", kind="torch")
-    checkpoint(root / "nan", kind="nan")
-    checkpoint(root / "short", kind="short")
-    checkpoint(root / "bold", kind="random", task="pick_place", mode="direct", actions="realised")
-    checkpoint(root / "bold_hand", kind="random", task="pick_place")
+    for kind in ("random", "torch", "nan", "short"):
+        checkpoint(root / kind, kind=kind)
+    checkpoint(root / "bold", mode="direct", actions="realised", **picks)
+    checkpoint(root / "bold_hand", **picks)
     checkpoint(root / "single", mode="direct_single")
     return root
 
@@ -65,9 +62,8 @@ def test_seeds_are_never_those_of_a_recording():
 
 @pytest.mark.slow
 def test_parallel_rollouts_are_the_serial_ones(folder, tmp_path):
-    both = config(
-        folder, "random", "chase_1", perturbation="none,push+shift+delay", episodes=2, time_limit=2.0
-    )
+    how = {"perturbation": "none,push+shift+delay", "time_limit": 2.0}
+    both = config(folder, "random", "chase_1", **how)
     serial = evaluate(both, load=load)
     parallel = evaluate(replace(both, workers=2, json=str(tmp_path / "e.json")), load=load)
     assert untimed(parallel) == untimed(serial)
@@ -126,13 +122,10 @@ def test_what_was_done_is_kept_when_a_rollout_fails(folder, tmp_path):
 
     done = []
 
-    def breaking(path):
-        whole = load(path)
-        return Breaking(whole.interface, "still")
-
     file = tmp_path / "e.json"
+    asked = config(folder, "short", json=str(file), episodes=5, time_limit=0.5)
     with pytest.raises(UnevaluatedError, match="RuntimeError: broken"):
-        evaluate(config(folder, "short", json=str(file), episodes=5, time_limit=0.5), load=breaking)
+        evaluate(asked, load=lambda path: Breaking(load(path).interface, "still"))
     assert len(rollouts(json.loads(file.read_text()), "ee intent")) == 2
 
 
@@ -153,16 +146,13 @@ def test_a_killed_worker_is_one_line_and_the_same_command_goes_on(folder, tmp_pa
 
 def test_an_intent_meets_the_controller_of_its_mode(folder):
     """What the policy asks for in teleop mode is completed as in teleop: the hand goes to the goal."""
-    content = evaluate(
-        config(folder, "chase", "chase_realised", protection="own,none", time_limit=12.0),
-        load=load,
-    )
+    asked = config(folder, "chase", "chase_realised", protection="own,none", time_limit=12.0)
+    content = evaluate(asked, load=load)
     assert set(content["arms"]) == {"ee intent", "ee intent unprotected", "ee"}
     for label in content["arms"]:
         assert all(row["success"] for row in rollouts(content, label)), label
         assert all(row["time_to_success"] == row["length"] for row in rollouts(content, label))
-    table = evaluation_table(content)
-    assert len(table.rows) == 3
+    assert len(evaluation_table(content).rows) == 3
 
 
 def test_a_rollout_has_the_time_that_the_demonstrations_had(folder):
@@ -214,8 +204,8 @@ WRONG = {
     "size": ({"perturbation": "push:-1"}, ("chase",), "--perturbation push:-1: expected a number above 0"),
     "half a period": ({"perturbation": "delay:1.5"}, ("chase",), "delay: expected a whole number"),
     "twice": ({"perturbation": "push+push"}, ("chase",), "expected each of push, shift, delay once"),
-    "filter": ({"protection": "filter"}, ("chase",), "expected a policy of joint velocities"),
-    "rests": ({"protection": "mpc"}, ("single",), "expected a policy of joint velocities"),
+    "filter": ({"protection": "filter"}, ("chase",), "or a policy of joint velocities"),
+    "rests": ({"protection": "mpc"}, ("single",), "or a policy of joint velocities"),
     "tasks": ({}, ("chase", "bold"), "expected policies for one task, got pick_place, reach"),
     "the same policy": ({}, ("chase", "nan"), "expected each dataset draw and training seed once"),
     "json": ({"json": "no/such/folder/e.json"}, ("chase",), "expected a .json file in an existing folder"),
@@ -239,7 +229,7 @@ def test_a_file_of_something_else_is_not_added_to(folder, tmp_path):
     evaluate(asked, load=load)
     before = file.read_bytes()
     for other, words in (
-        (config(folder, "nan", json=str(file), time_limit=0.5), "has another policy with dataset draw"),
+        (config(folder, "nan", json=str(file), time_limit=0.5), "has another policy of dataset draw"),
         (config(folder, "bold", json=str(file)), "expected task reach, got pick_place"),
         (replace(asked, time_limit=1.0), "expected {"),
     ):
@@ -249,10 +239,3 @@ def test_a_file_of_something_else_is_not_added_to(folder, tmp_path):
     file.write_text("{}")
     with pytest.raises(HandrailError, match="expected the format"):
         evaluate(asked, load=load)
-
-
-def test_the_command_says_one_line():
-    done = command("--policy", "nowhere", name="evaluate")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert "expected a checkpoint with a config.json" in done.stderr
-    assert "--perturbation" in command("--help", name="evaluate").stdout

@@ -44,32 +44,12 @@ def digests(folder: Path) -> dict[str, str]:
 def test_a_training_killed_while_it_writes(tmp_path):
     """Law: a checkpoint that has its name is whole and stays; the end is to the bit the same."""
     recorded, output, rng = write_dataset(tmp_path / "set"), tmp_path / "killed", np.random.default_rng(0)
-    flags = [
-        "--dataset.root",
-        recorded,
-        "--output",
-        output,
-        "--steps",
-        60,
-        "--batch_size",
-        8,
-        "--save_freq",
-        4,
-    ]
+    flags = f"--dataset.root {recorded} --output {output} --steps 60 --batch_size 8 --save_freq 4 --resume"
+    words = ("train", *flags.split(), "--policy_options", *TINY)
     kept: dict[str, str] = {}
     for kill in range(KILLS):
         change = int(rng.integers(2, 40))
-        died = killed(
-            output,
-            change,
-            run_command,
-            "train",
-            *flags,
-            "--resume",
-            "--policy_options",
-            *TINY,
-        )
-        assert died, f"{kill}: not killed at change {change}"
+        assert killed(output, change, run_command, *words), f"{kill}: not killed at change {change}"
         now = digests(output)
         assert kept.items() <= now.items()
         for step in {Path(path).parts[1] for path in now}:
@@ -97,12 +77,8 @@ def without_times(rows: list[dict]) -> list[dict]:
 
 def test_an_evaluation_killed_while_it_writes(tmp_path):
     """Law: the file is whole whenever it is there, loses no rollout, and no rollout is run again."""
-    policy, file, rng = (
-        untrained_act(tmp_path / "policy", "realised"),
-        tmp_path / "e.json",
-        np.random.default_rng(0),
-    )
-    count = 40
+    policy, file = untrained_act(tmp_path / "policy", "realised"), tmp_path / "e.json"
+    count, rng = 40, np.random.default_rng(0)
     flags = ["--policy", policy, "--episodes", count, "--time_limit", 0.2, "--json", file, "--workers", 1]
     kept: list[dict] = []
     for _ in range(KILLS):
@@ -124,10 +100,9 @@ def kept_of(study: Path) -> set[str]:
     for info in study.glob("datasets/*/*/meta/info.json"):
         root = info.parents[1]
         for row in read_episodes(root):
-            frames = read_frames(root, row["episode_index"])
-            found.add(
-                f"{root} {row['episode_index']} {hashlib.sha256(frames['action'].tobytes()).hexdigest()}"
-            )
+            number = row["episode_index"]
+            action = read_frames(root, number)["action"].tobytes()
+            found.add(f"{root} {number} {hashlib.sha256(action).hexdigest()}")
     for checkpoints in study.glob("policies/**/checkpoints"):
         found |= {f"{checkpoints} {item}" for item in digests(checkpoints.parent).items()}
     for file in study.glob("evaluations/**/*.json"):

@@ -39,17 +39,14 @@ def plain(honest, tmp_path):
     return shutil.copytree(honest, tmp_path / "plain")
 
 
+def says(folder, **settings):
+    """Let a policy say something else of itself."""
+    path = folder / "config.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | settings))
+
+
 def reads(folder, **features):
-    """Let a policy say that it reads something else."""
-    path = folder / "config.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"input_features": features}))
-
-
-def writes(folder, size):
-    """Let a policy say that it writes so many numbers."""
-    path = folder / "config.json"
-    said = {"output_features": {"action": {"type": "ACTION", "shape": [size]}}}
-    path.write_text(json.dumps(json.loads(path.read_text()) | said))
+    says(folder, input_features=features)
 
 
 def config(*folders, **settings):
@@ -65,12 +62,21 @@ def test_a_policy_of_plain_lerobot_drives(honest):
     assert entry["training_seed"] == 1000
     (row,) = entry["rollouts"]
     assert (row["length"], row["malformed"]) == (0.5, 0)
-    conditions = content["conditions"]["act"]
-    assert (conditions["robot"], conditions["fps"], conditions["actions"]) == (
-        "ridgeback_ur10",
-        "20",
-        "recorded",
-    )
+    said = {"robot": "ridgeback_ur10", "fps": "20", "actions": "recorded"}
+    assert said.items() <= content["conditions"]["act"].items()
+
+
+def test_an_untrained_act_drives_without_contact_and_repeatably(tmp_path):
+    asked = config(*(untrained_act(tmp_path / kind, kind) for kind in ("intent", "realised")), time_limit=1.0)
+    first, again = evaluate(asked), evaluate(asked)
+    assert set(first["arms"]) == {"ee intent", "ee"}
+    for label, arm in first["arms"].items():
+        (row,), (repeated,) = arm[0]["rollouts"], again["arms"][label][0]["rollouts"]
+        assert row.pop("timing")["policy"] > 0
+        del repeated["timing"]
+        assert row == repeated
+        assert row["length"] == 1.0
+        assert row["malformed"] == row["brakes"] == row["contacts"] == 0
 
 
 def test_the_rate_is_the_one_that_is_asked_for(honest):
@@ -107,25 +113,18 @@ def picture(*shape):
 
 
 def test_a_policy_may_see_pictures_instead_of_the_environment_s_state(plain):
-    reads(
-        plain,
-        **{
-            "observation.state": FEATURES["observation.state"],
-            "observation.images.wrist": picture(3, 64, 64),
-        },
-    )
+    state = FEATURES["observation.state"]
+    reads(plain, **{"observation.state": state, "observation.images.wrist": picture(3, 64, 64)})
     (condition,), _ = policy_conditions(config(plain, task="tray"))
-    assert (condition.checkpoint.meta.environment, dict(condition.checkpoint.pictures)) == (
-        "tray",
-        {"wrist": (64, 64)},
-    )
+    assert condition.checkpoint.meta.environment == "tray"
+    assert condition.checkpoint.pictures == {"wrist": (64, 64)}
 
 
 @pytest.mark.parametrize(("size", "mode", "numbers"), [(33, "ee", 7), (54, "switching", 11)])
 def test_what_lerobot_record_recorded_is_driven_with_its_mode(size, mode, numbers, plain):
     """There robot and scene are one vector, and an action is the mode's channels."""
     reads(plain, **{"observation.state": {"type": "STATE", "shape": [size]}})
-    writes(plain, numbers)
+    says(plain, output_features={"action": {"type": "ACTION", "shape": [numbers]}})
     with pytest.raises(HandrailError, match=f"'action': {numbers}"):
         policy_conditions(config(plain))
     task = {33: "reach", 54: "pick_place"}[size]
@@ -157,16 +156,6 @@ def test_what_cannot_be_evaluated_says_why_in_one_line(features, words, plain):
     assert "\n" not in str(raised.value)
 
 
-def test_what_a_policy_does_not_take_is_one_line(plain):
-    """A state of another size than its weights have."""
-    path = plain / "config.json"
-    content = json.loads(path.read_text())
-    path.write_text(json.dumps(content | {"dim_model": 64}))
-    with pytest.raises(HandrailError, match=r"policy .*size mismatch") as raised:
-        evaluate(config(plain))
-    assert "\n" not in str(raised.value)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     root = tmp_path_factory.mktemp("policies")
@@ -187,12 +176,8 @@ def test_one_bad_policy_is_named_and_the_others_run(workers, folder, tmp_path):
     with pytest.raises(UnevaluatedError) as raised:
         evaluate(asked, load=unable)
     assert [reason.count("\n") for reason in raised.value.reasons] == [0, 0, 0]
-    for name, words in (
-        ("nothing", "found none"),
-        ("mixed", "unknown mode 'mixed'"),
-        ("broken", "no weights"),
-    ):
-        assert any(words in reason for reason in raised.value.reasons), name
+    for words in ("found none", "unknown mode 'mixed'", "no weights"):
+        assert any(words in reason for reason in raised.value.reasons)
     assert json.loads(file.read_text()) == raised.value.content
     runs = raised.value.content["arms"]["ee intent"]
     assert [(run["training_seed"], len(run["rollouts"])) for run in runs] == [(0, 3), (1, 3)]

@@ -6,18 +6,14 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import sys
-import time
 from unittest import mock
 
-import numpy as np
 import pytest
+from canned import canned
 from lerobot.scripts.lerobot_train import update_policy
-from training_helpers import TINY, cut, tiny, weights, write_dataset
+from training_helpers import cut, refused, tiny, weights, write_dataset
 
 from handrail.collect.config import StoredConfig
-from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import NAME, last_checkpoint, read_meta, write_meta
 from handrail.policies.imitation.training import presets, run
 from handrail.policies.imitation.training.curve import read_curve
@@ -30,9 +26,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).
 def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
     """With dropout, over the end of an epoch: 24 samples are three batches."""
     folder, config = trained
-    again = dataclasses.replace(config, output=str(tmp_path / "cut"), resume=True)
-    shutil.copytree(config.folder, tmp_path / "cut", symlinks=True)
-    shutil.rmtree(tmp_path / "cut" / "checkpoints" / "000006")
+    again = cut(config, tmp_path / "cut")
     assert weights(train(again, quiet=True)) == weights(folder)
     longer = train(dataclasses.replace(again, steps=8), quiet=True)
     assert read_meta(longer).steps == 8
@@ -41,7 +35,7 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
 def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recorded, tmp_path):
     part = tiny(recorded, tmp_path / "whole", episodes=2, draw=3)
     whole = train(part, quiet=True)
-    grown = StoredConfig(root=str(write_dataset(tmp_path / "grown", lengths=(9, 7, 8, 5, 6))))
+    grown = StoredConfig(root=str(canned(write_dataset, lengths=(9, 7, 8, 5, 6))))
     assert weights(train(cut(part, tmp_path / "cut"), quiet=True)) == weights(whole)
     later = dataclasses.replace(cut(part, tmp_path / "later"), dataset=grown)
     chosen = read_source(dataclasses.replace(later, resume=False)).selection
@@ -53,20 +47,14 @@ def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recor
     assert read_meta(resumed).trained_on == meta.trained_on
 
 
-def test_a_training_does_not_go_on_with_other_data_fewer_steps_or_other_sizes(
-    trained, recorded, tmp_path, monkeypatch
-):
+def test_a_training_does_not_go_on_with_other_data_steps_or_sizes(trained, tmp_path, monkeypatch):
     config = cut(trained[1], tmp_path / "cut")
-    longer = write_dataset(tmp_path / "longer", lengths=(9, 8, 7))
-    fewer = write_dataset(tmp_path / "fewer", lengths=(9, 7))
+    longer, fewer = (canned(write_dataset, lengths=lengths) for lengths in ((9, 8, 7), (9, 7)))
     for root, said in ((longer, "got others"), (fewer, "has no episode 2")):
-        with pytest.raises(HandrailError, match=said):
-            train(dataclasses.replace(config, dataset=StoredConfig(root=str(root))), quiet=True)
-    with pytest.raises(HandrailError, match="--steps 5: expected 6 or more"):
-        train(dataclasses.replace(config, steps=5), quiet=True)
+        refused(dataclasses.replace(config, dataset=StoredConfig(root=str(root))), said)
+    refused(dataclasses.replace(config, steps=5), "--steps 5: expected 6 or more")
     monkeypatch.setitem(presets.ACT_CPU, "dropout", 0.1)
-    with pytest.raises(HandrailError, match=r"dropout 0\.1: expected 0\.0"):
-        train(config, quiet=True)
+    refused(config, r"dropout 0\.1: expected 0\.0")
 
 
 def test_a_training_goes_on_with_the_view_that_it_began_with(recorded, tmp_path):
@@ -80,51 +68,19 @@ def test_a_training_goes_on_with_the_view_that_it_began_with(recorded, tmp_path)
     content = json.loads(path.read_text())
     del content["interface"]["base_pose"], content["training"]["base_pose"]
     path.write_text(json.dumps(content))
-    with pytest.raises(HandrailError, match="--base_pose True: expected False"):
-        train(dataclasses.replace(older, base_pose=True), quiet=True)
+    refused(dataclasses.replace(older, base_pose=True), "--base_pose True: expected False")
     assert weights(train(older, quiet=True)) == weights(whole)
 
 
 def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, tmp_path):
     config = tiny(recorded, tmp_path / "whole")
     whole = train(config, quiet=True)
-    for number, root in enumerate((recorded, write_dataset(tmp_path / "more", lengths=(9, 7, 8, 5)))):
-        again = dataclasses.replace(
-            cut(config, tmp_path / f"cut{number}"), dataset=StoredConfig(root=str(root))
-        )
-        meta = read_meta(folder := again.folder / "checkpoints" / "000003" / "pretrained_model")
-        write_meta(folder, dataclasses.replace(meta, episodes=(), data="", sizes={}))
-        if number:
-            with pytest.raises(HandrailError, match="expected the 3 episodes"):
-                train(again, quiet=True)
-        else:
-            assert weights(train(again, quiet=True)) == weights(whole)
-
-
-@pytest.mark.slow
-def test_a_killed_training_goes_on(recorded, tmp_path):
-    steps = 250
-    whole = tiny(recorded, tmp_path / "whole", steps=steps, save_freq=20)
-    killed = dataclasses.replace(whole, output=str(tmp_path / "killed"), resume=True)
-    flags = ["--dataset.root", recorded, "--output", killed.output, "--steps", steps, "--batch_size", 8]
-    flags += ["--save_freq", 20, "--resume", "--policy_options", *TINY]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "handrail.scripts", "train", *map(str, flags)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        while last_checkpoint(killed.folder) is None and process.poll() is None:
-            time.sleep(0.01)
-        time.sleep(np.random.default_rng(0).uniform(0.0, 0.1))
-    finally:
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
-    reached = last_checkpoint(killed.folder)
-    assert reached is not None
-    assert reached.name < f"{steps:06d}", "killed too late to see anything"
-    killed = dataclasses.replace(killed, dataset=StoredConfig(root=str(recorded)))
-    assert weights(train(killed, quiet=True)) == weights(train(whole, quiet=True))
+    again = cut(config, tmp_path / "cut")
+    meta = read_meta(folder := again.folder / "checkpoints" / "000003" / "pretrained_model")
+    write_meta(folder, dataclasses.replace(meta, episodes=(), data="", sizes={}))
+    more = StoredConfig(root=str(canned(write_dataset, lengths=(9, 7, 8, 5))))
+    refused(dataclasses.replace(again, dataset=more), "expected the 3 episodes")
+    assert weights(train(again, quiet=True)) == weights(whole)
 
 
 def test_the_curve_has_a_row_every_fifty_updates_also_after_a_cut(recorded, tmp_path):
@@ -141,15 +97,15 @@ def test_the_curve_has_a_row_every_fifty_updates_also_after_a_cut(recorded, tmp_
 
 def test_a_training_that_is_interrupted_saves_a_checkpoint_and_goes_on_to_the_same_losses(tmp_path):
     """SIGTERM comes while an update is made, between two rows of the curve and two measurements."""
-    root = write_dataset(tmp_path / "set", lengths=(9, 7, 8, 5, 6, 7, 8))
+    root = canned(write_dataset, lengths=(9, 7, 8, 5, 6, 7, 8))
     whole = tiny(root, tmp_path / "whole", steps=100, save_freq=1000, eval_split=0.3, eval_steps=40)
     cut_off = dataclasses.replace(whole, output=str(tmp_path / "cut"))
+    words = "^training: interrupted; --resume goes on after update 63$"
     with (
         mock.patch.object(run, "update_policy", interrupted(at=63)),
-        pytest.raises(KeyboardInterrupt) as said,
+        pytest.raises(KeyboardInterrupt, match=words),
     ):
         train(cut_off, quiet=True)
-    assert str(said.value) == "training: interrupted; --resume goes on after update 63"
     policies = train(dataclasses.replace(cut_off, resume=True), quiet=True), train(whole, quiet=True)
     assert weights(policies[0]) == weights(policies[1])
     metas = [read_meta(each).validation for each in policies]

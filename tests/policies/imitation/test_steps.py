@@ -10,7 +10,7 @@ import pytest
 import torch
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
-from training_helpers import CHANNELS, ENVIRONMENT, STATE, frame, tiny, write_dataset
+from training_helpers import CHANNELS, ENVIRONMENT, STATE, frame, tiny
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -34,20 +34,10 @@ print(*(step._registry_name for step in (*before.steps, *after.steps)))
 """
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory):
-    return write_dataset(tmp_path_factory.mktemp("steps") / "set")
-
-
 @pytest.fixture(scope="module", params=["realised", "intent"])
-def checkpoint(request, dataset, tmp_path_factory):
+def checkpoint(request, recorded, tmp_path_factory):
     output = tmp_path_factory.mktemp(request.param) / "policy"
-    return request.param, train(tiny(dataset, output, actions=request.param, steps=3), quiet=True)
-
-
-@pytest.fixture
-def trained(checkpoint):
-    return checkpoint[1]
+    return request.param, train(tiny(recorded, output, actions=request.param, steps=3), quiet=True)
 
 
 def seen():
@@ -58,8 +48,9 @@ def seen():
     }
 
 
-def test_plain_loading_acts_as_the_interface_does(trained):
+def test_plain_loading_acts_as_the_interface_does(checkpoint):
     """What LeRobot's evaluation does with a checkpoint, and what ours does with it, are the same."""
+    _, trained = checkpoint
     config = PreTrainedConfig.from_pretrained(trained)
     policy = get_policy_class(config.type).from_pretrained(trained, config=config)
     before, after = make_pre_post_processors(config, str(trained))
@@ -68,19 +59,29 @@ def test_plain_loading_acts_as_the_interface_does(trained):
         after.steps = [*steps[:-1], PolicyActionStep(steps[-1].interface)]
     ours, raw = load_policy(trained), seen()
     state, environment = raw.values()
+    acted = []
     for _ in range(3):
         batch = before({key: torch.from_numpy(values)[None] for key, values in raw.items()})
         with torch.inference_mode():
-            acted = after(policy.select_action(batch))[0].numpy()
-        meant = ours.interface.decode(ours.act(*ours.interface.observe(state, environment)), state)
-        np.testing.assert_array_equal(acted[:-1], meant.values[meant.mask])
-        assert acted[-1] == meant.gripper
+            theirs = after(policy.select_action(batch))[0].numpy()
+        acted.append(ours.act(*ours.interface.observe(state, environment)))
+        meant = ours.interface.decode(acted[-1], state)
+        np.testing.assert_array_equal(theirs[:-1], meant.values[meant.mask])
+        assert theirs[-1] == meant.gripper
+    assert not np.array_equal(acted[0], acted[1])  # the next of the chunk
+    ours.reset()
+    np.testing.assert_array_equal(ours.act(*ours.interface.observe(state, environment)), acted[0])
+
+
+def steps_of(*masks):
+    """Return an interface, and the steps that see and act through it."""
+    interface = PolicyInterface("intent" if masks else "realised", STATE, ENVIRONMENT, CHANNELS.names, masks)
+    described = json.loads(json.dumps(interface.__dict__, default=list))
+    return interface, PolicyViewStep(described), PolicyActionStep(described)
 
 
 def test_a_mask_becomes_the_focus_and_what_is_no_number_stays_none():
-    interface = PolicyInterface("intent", STATE, ENVIRONMENT, CHANNELS.names, MASKS)
-    described = json.loads(json.dumps(interface.__dict__, default=list))
-    view, act = PolicyViewStep(described), PolicyActionStep(described)
+    interface, view, act = steps_of(*MASKS)
     raw = {key: torch.from_numpy(values)[None] for key, values in seen().items()}
     view({"observation": raw})
     size = len(interface.action_names)
@@ -92,15 +93,13 @@ def test_a_mask_becomes_the_focus_and_what_is_no_number_stays_none():
 
 
 def test_what_was_not_seen_or_does_not_fit_is_said():
-    interface = PolicyInterface("realised", STATE, ENVIRONMENT, CHANNELS.names)
-    described = json.loads(json.dumps(interface.__dict__, default=list))
-    view, act = PolicyViewStep(described), PolicyActionStep(described)
+    _, view, act = steps_of()
     with pytest.raises(HandrailError, match="to see something first"):
         act({"action": torch.zeros(1, 10)})
     with pytest.raises(HandrailError, match=rf"expected observation\.state with {len(STATE)} numbers"):
         view({"observation": {"observation.state": torch.zeros(1, 3)}})
     with pytest.raises(HandrailError, match="actions: expected one of realised, intent"):
-        PolicyViewStep(described | {"actions": "none"})
+        PolicyViewStep(view.interface | {"actions": "none"})
 
 
 def test_nothing_is_added_where_the_policy_reads_what_is_recorded():
@@ -111,11 +110,9 @@ def test_nothing_is_added_where_the_policy_reads_what_is_recorded():
 def test_a_checkpoint_of_intents_says_what_completes_them(checkpoint):
     actions, folder = checkpoint
     steps = json.loads((folder / "policy_postprocessor.json").read_text())["steps"]
-    (completes,) = [step["config"]["completion"] for step in steps if "completion" in step["config"]] or [
-        None
-    ]
+    completes = [step["config"]["completion"] for step in steps if "completion" in step["config"]]
     by = {"robot": "ridgeback_ur10", "task": "reach", "mode": "ee", "fps": 20}
-    assert completes == (by if actions == "intent" else None)
+    assert completes == ([by] if actions == "intent" else [])
 
 
 @pytest.mark.slow
@@ -128,8 +125,8 @@ def test_a_fresh_process_that_discovers_our_package_loads_it(checkpoint):
     assert acts[actions] in done.stdout
 
 
-def test_a_training_that_goes_on_keeps_the_steps_and_adds_none(dataset, tmp_path):
-    begun = train(tiny(dataset, tmp_path / "policy", steps=2), quiet=True)
-    gone_on = train(tiny(dataset, tmp_path / "policy", steps=4, resume=True), quiet=True)
+def test_a_training_that_goes_on_keeps_the_steps_and_adds_none(recorded, tmp_path):
+    begun = train(tiny(recorded, tmp_path / "policy", steps=2), quiet=True)
+    gone_on = train(tiny(recorded, tmp_path / "policy", steps=4, resume=True), quiet=True)
     for processor in ("policy_preprocessor.json", "policy_postprocessor.json"):
         assert (gone_on / processor).read_bytes() == (begun / processor).read_bytes()

@@ -5,11 +5,12 @@ import os
 import pickle
 import shutil
 
+import numpy as np
 import pytest
 from command_helpers import command
 from policy_helpers import untrained_act
-from safetensors.numpy import save_file
-from training_helpers import tiny, write_dataset
+from safetensors.numpy import load_file, save_file
+from training_helpers import cut, tiny, write_dataset
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -20,6 +21,7 @@ from handrail.policies.imitation.training.training import train
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
+MARKER = "marker"
 DEEP = "[" * 200_000
 
 
@@ -84,30 +86,25 @@ def test_files_that_are_called_like_what_a_policy_reads_do_no_harm(policy, tmp_p
 @pytest.mark.parametrize(
     ("name", "config"),
     [
-        ("subprocess.Popen", lambda marker: {"args": ["touch", marker]}),
-        ("subprocess.check_call", lambda marker: {"args": ["touch", marker]}),
-        ("os.mkdir", lambda marker: {"path": marker}),
-        ("lerobot.processor.normalize_processor.NormalizerProcessorStep", lambda marker: {}),
+        ("subprocess.Popen", {"args": ["touch", MARKER]}),
+        ("os.mkdir", {"path": MARKER}),
+        ("lerobot.processor.normalize_processor.NormalizerProcessorStep", {}),
     ],
 )
-def test_a_step_named_by_its_class_is_never_made(file, name, config, policy, tmp_path):
-    marker = tmp_path / "marker"
-    add_step(policy / file, **{"class": name, "config": config(str(marker))})
+def test_a_step_named_by_its_class_is_never_made(file, name, config, policy, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    add_step(policy / file, **{"class": name, "config": config})
     refused(policy, f"{file}.*step .*expected a registered name, got the class")
-    assert not marker.exists()
+    assert not (tmp_path / MARKER).exists()
 
 
-@pytest.mark.parametrize(
-    "entry",
-    [
-        {"registry_name": "nothing"},
-        {"registry_name": ["normalizer_processor"]},
-        {"registry_name": "device_processor", "class": "os.mkdir"},
-        {"config": {}},
-        "os.mkdir",
-        None,
-    ],
+NOT_REGISTERED = (
+    *({"registry_name": "nothing"}, {"registry_name": ["normalizer_processor"]}, {"config": {}}),
+    *({"registry_name": "device_processor", "class": "os.mkdir"}, "os.mkdir", "device_processor", None),
 )
+
+
+@pytest.mark.parametrize("entry", NOT_REGISTERED)
 def test_a_step_has_to_be_registered(entry, policy):
     file = policy / PROCESSORS[0]
     change(file, steps=[*json.loads(file.read_text())["steps"], entry])
@@ -120,22 +117,18 @@ def test_a_policy_has_to_be_registered(kind, policy):
     refused(policy, "unknown policy")
 
 
-@pytest.mark.parametrize("where", ["above", "absolute", "below", "link", "number"])
-def test_the_numbers_of_a_step_lie_in_the_folder(where, policy, tmp_path):
-    file = policy / PROCESSORS[0]
-    steps = json.loads(file.read_text())["steps"]
-    outside = tmp_path / "outside.safetensors"
+OUTSIDE = (*(f"{place}out.safetensors" for place in ("../", "{}/", "below/")), "link.safetensors", 7)
+
+
+@pytest.mark.parametrize("place", OUTSIDE)
+def test_the_numbers_of_a_step_lie_in_the_folder(place, policy, tmp_path):
+    file, outside = policy / PROCESSORS[0], tmp_path / "out.safetensors"
     (policy / "below").mkdir()
-    for place in (outside, policy / "below" / "outside.safetensors"):
-        save_file({}, place)
+    for path in (outside, policy / "below" / "out.safetensors"):
+        save_file({}, path)
     (policy / "link.safetensors").symlink_to(outside)
-    steps[-1]["state_file"] = {
-        "above": "../outside.safetensors",
-        "absolute": str(outside),
-        "below": "below/outside.safetensors",
-        "link": "link.safetensors",
-        "number": 7,
-    }[where]
+    steps = json.loads(file.read_text())["steps"]
+    steps[-1]["state_file"] = place.format(tmp_path) if isinstance(place, str) else place
     change(file, steps=steps)
     refused(policy, "stranger")
 
@@ -215,51 +208,34 @@ def test_a_malformed_file_is_one_line(name, policy):
         refused(policy, "stranger")
 
 
-@pytest.mark.parametrize(
-    ("entry", "value"),
-    [
-        ("robot", "../evil.toml"),
-        ("robot", "/etc/evil.toml"),
-        ("fps", 0),
-        ("fps", "many"),
-        ("fps", 10**9),
-        ("mode", "[/x]"),
-        ("mode", ["ee"]),
-        ("environment", ["reach"]),
-        ("actions", "targets"),  # joint positions, which an older Handrail had
-        ("training_seed", -1),
-        ("training_seed", True),
-        ("trained_on", {"episodes": "many"}),
-        ("trained_on", []),
-        ("sizes", {"steps": "many"}),
-        ("sizes", {"options": []}),
-        ("actions", "recorded"),
-        ("actions", "intent"),
-        ("nonsense", 1),
-        ("interface", []),
-        ("interface", {"actions": "realised"}),
-    ],
+OF_A_POLICY = (
+    *(("robot", value) for value in ("../evil.toml", "/etc/evil.toml")),
+    *(("fps", value) for value in (0, "many", 10**9)),
+    *(("mode", value) for value in ("[/x]", ["ee"])),
+    *(("actions", value) for value in ("targets", "recorded", "intent")),  # targets: of an older Handrail
+    *(("training_seed", value) for value in (-1, True)),
+    *(("trained_on", value) for value in ({"episodes": "many"}, [])),
+    *(("sizes", value) for value in ({"steps": "many"}, {"options": []})),
+    *(("interface", value) for value in ([], {"actions": "realised"})),
+    *(("environment", ["reach"]), ("nonsense", 1)),
 )
+OF_AN_INTERFACE = (
+    *(("state_names", "abc"), ("channels", [1]), ("masks", [[True]]), ("masks", 3)),
+    *(("actions", {}), ("actions", "targets")),
+)
+
+
+@pytest.mark.parametrize(("entry", "value"), OF_A_POLICY)
 def test_what_a_policy_says_of_itself_is_checked(entry, value, policy):
     change(policy / "handrail.json", **{entry: value})
     refused(policy, entry)
 
 
-@pytest.mark.parametrize(
-    ("entry", "value"),
-    [
-        ("state_names", "abc"),
-        ("channels", [1]),
-        ("masks", [[True]]),
-        ("masks", 3),
-        ("actions", {}),
-        ("actions", "targets"),
-    ],
-)
+@pytest.mark.parametrize(("entry", "value"), OF_AN_INTERFACE)
 def test_what_an_interface_says_is_checked(entry, value, policy):
     interface = json.loads((policy / "handrail.json").read_text())["interface"]
     change(policy / "handrail.json", interface=interface | {entry: value})
-    refused(policy, "interface|action space")
+    refused(policy, f"interface: {entry}")
 
 
 def test_a_training_that_goes_on_runs_no_code_either(tmp_path):
@@ -276,3 +252,36 @@ def test_a_training_that_goes_on_runs_no_code_either(tmp_path):
     (state / "rng_state.safetensors").symlink_to(tmp_path / "outside")
     with pytest.raises(HandrailError, match=r"rng_state.*found a link out of it"):
         train(resumed, quiet=True)
+
+
+def spoil(file, how):
+    """Give one array of a safetensors file another name or a NaN, or leave it out."""
+    arrays = {name: values.copy() for name, values in load_file(file).items()}
+    name = "model.action_head.weight" if "model.action_head.weight" in arrays else "observation.state.mean"
+    values = arrays[name]
+    if how in ("foreign", "missing"):
+        gone = {key for key in arrays if key.startswith(name.removesuffix("mean"))}
+        arrays = {key: each for key, each in arrays.items() if key not in gone}
+    if how == "foreign":
+        arrays["stranger.mean"] = values
+    if how == "nan":
+        values.flat[0] = np.nan
+    if how == "endless":
+        values.flat[0] = np.inf
+    save_file(arrays, file)
+
+
+@pytest.mark.parametrize("how", ["foreign", "missing", "nan", "endless"])
+@pytest.mark.parametrize("file", ["model", "policy_preprocessor_*_normalizer_processor"])
+def test_weights_and_statistics_are_the_policy_s_and_finite(file, how, trained, tmp_path):
+    """Law: a policy that would drive at random is refused, to be evaluated and to learn on."""
+    config = cut(trained[1], tmp_path / "training")
+    place = model_folder(config.folder)
+    (spoilt,) = place.glob(f"{file}.safetensors")
+    assert load_policy(place).meta
+    spoil(spoilt, how)
+    once = EvaluateConfig(policy=(str(place),), episodes=1, workers=1)
+    for use in (lambda: load_policy(place), lambda: evaluate(once), lambda: train(config, quiet=True)):
+        with pytest.raises(HandrailError, match=r"policy '.*training") as raised:
+            use()
+        assert "\n" not in str(raised.value)

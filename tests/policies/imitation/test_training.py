@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import re
 import subprocess
 import sys
 from typing import Any
@@ -10,9 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from command_helpers import command
 from places import ROOT
-from training_helpers import FPS, TINY, features, tiny, weights, write_dataset
+from training_helpers import FPS, TINY, features, refused, tiny, weights, write_dataset
 
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
@@ -35,9 +35,7 @@ def test_the_dataset_in_memory_gives_the_same_tensors_as_lerobot_s_own(policy, r
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     options = TINY if policy == "act" else ("horizon=8", "n_action_steps=4")
-    config = dataclasses.replace(
-        tiny(recorded, tmp_path), actions="recorded", policy=policy, policy_options=options
-    )
+    config = tiny(recorded, tmp_path, actions="recorded", policy=policy, policy_options=options)
     described = policy_config(config)
     ours = read_source(config).dataset(described)
     stamps = resolve_delta_timestamps(described, ours.meta)
@@ -54,15 +52,13 @@ def test_the_dataset_in_memory_gives_the_same_tensors_as_lerobot_s_own(policy, r
 
 
 def test_what_is_learnt_is_what_the_interface_makes_of_the_recording(recorded, tmp_path):
-    source = read_source(dataclasses.replace(tiny(recorded, tmp_path), actions="intent"))
+    source = read_source(tiny(recorded, tmp_path, actions="intent"))
     frames = read_frames(recorded, 1)
     assert source.interface is not None
-    state, environment = source.interface.observe(
-        frames["observation.state"], frames["observation.environment_state"]
-    )
+    seen = source.interface.observe(frames["observation.state"], frames["observation.environment_state"])
     rows = source.columns["episode_index"] == 1
-    np.testing.assert_array_equal(source.columns["observation.state"][rows], state)
-    np.testing.assert_array_equal(source.columns["observation.environment_state"][rows], environment)
+    np.testing.assert_array_equal(source.columns["observation.state"][rows], seen[0])
+    np.testing.assert_array_equal(source.columns["observation.environment_state"][rows], seen[1])
     np.testing.assert_array_equal(source.columns["action"][rows], source.interface.encode(frames))
 
 
@@ -70,9 +66,8 @@ def test_statistics_are_of_the_chosen_episodes_only(recorded, tmp_path):
     config = tiny(recorded, tmp_path, episodes=1)
     source = read_source(config)
     dataset = source.dataset(policy_config(config))
-    np.testing.assert_allclose(
-        dataset.meta.stats["action"]["mean"], source.columns["action"].mean(axis=0), atol=1e-6
-    )
+    mean = source.columns["action"].mean(axis=0)
+    np.testing.assert_allclose(dataset.meta.stats["action"]["mean"], mean, atol=1e-6)
     assert len(dataset.meta.lengths) == 1
 
 
@@ -106,28 +101,6 @@ def test_a_checkpoint_says_how_long_its_episodes_could_last(limits, longest, tmp
     assert read_meta(folder).time_limit == longest
 
 
-def test_a_loaded_policy_acts_like_lerobot_s(trained, recorded):
-    from lerobot.policies.act.modeling_act import ACTPolicy
-
-    policy = load_policy(trained[0])
-    assert policy.interface is not None
-    frames = read_frames(recorded, 0)
-    seen = policy.interface.observe(
-        frames["observation.state"][0], frames["observation.environment_state"][0]
-    )
-    first = policy.act(*seen)
-    assert first.shape == (len(policy.interface.action_names),)
-    assert first.dtype == np.float32
-    second = policy.act(*seen)
-    policy.reset()
-    np.testing.assert_array_equal(policy.act(*seen), first)
-    assert not np.array_equal(first, second)  # the next of the chunk
-    plain = ACTPolicy.from_pretrained(trained[0])
-    keys = ("observation.state", "observation.environment_state")
-    batch = policy.before({key: torch.from_numpy(part)[None] for key, part in zip(keys, seen, strict=True)})
-    np.testing.assert_array_equal(policy.after(plain.select_action(batch))[0].numpy(), first)
-
-
 def test_the_same_seed_gives_the_same_weights_and_another_seed_others(trained, tmp_path):
     folder, config = trained
     again = train(dataclasses.replace(config, output=str(tmp_path / "again")), quiet=True)
@@ -137,9 +110,8 @@ def test_the_same_seed_gives_the_same_weights_and_another_seed_others(trained, t
 
 
 def test_sizes_are_what_the_policy_and_the_training_get(recorded, tmp_path):
-    config = tiny(
-        recorded, tmp_path, policy_options=("chunk_size=7", "n_action_steps=3"), batch_size=0, lr=0.25
-    )
+    options = ("chunk_size=7", "n_action_steps=3")
+    config = tiny(recorded, tmp_path, policy_options=options, batch_size=0, lr=0.25)
     sizes, described = presets.resolved(config), vars(policy_config(config))
     for name, value in sizes.options.items():
         assert described[name] == value
@@ -151,15 +123,10 @@ def test_sizes_are_what_the_policy_and_the_training_get(recorded, tmp_path):
 
 @pytest.mark.parametrize("option", ["dim_model=130", "dropout=2.0", "feedforward_activation=loud"])
 def test_what_a_policy_cannot_be_built_with_is_one_line_before_there_is_data(option, recorded, tmp_path):
-    config = TrainConfig(policy_options=(option,))
+    config = TrainConfig(StoredConfig(root=str(recorded)), str(tmp_path), policy_options=(option,))
     with pytest.raises(HandrailError, match="policy act: ") as before:
         presets.check_policy(config)
-    with pytest.raises(HandrailError) as after:
-        train(
-            dataclasses.replace(config, dataset=StoredConfig(root=str(recorded)), output=str(tmp_path)),
-            quiet=True,
-        )
-    assert str(before.value) == str(after.value)
+    refused(config, f"^{re.escape(str(before.value))}$")
     presets.check_policy(TrainConfig())
 
 
@@ -176,9 +143,7 @@ def test_a_launch_that_splits_the_model_is_refused_in_one_line(kind, recorded, t
     from accelerate.utils import DistributedType
 
     monkeypatch.setattr(Accelerator, "distributed_type", DistributedType[kind])
-    with pytest.raises(HandrailError, match=f"expected one process or --multi_gpu, got {kind}") as error:
-        train(tiny(recorded, tmp_path / "policy"), quiet=True)
-    assert "\n" not in str(error.value)
+    refused(tiny(recorded, tmp_path / "policy"), f"expected one process or --multi_gpu, got {kind}")
     assert not (tmp_path / "policy").exists()
 
 
@@ -190,8 +155,7 @@ def _ours(self, indices):
 def test_a_file_in_the_place_of_the_training_is_one_line(resume, recorded, tmp_path):
     (tmp_path / "file").touch()
     for place, said in (("file", "found a file"), ("file/below", "file/below: ")):
-        with pytest.raises(HandrailError, match=said):
-            train(tiny(recorded, tmp_path / place, resume=resume), quiet=True)
+        refused(tiny(recorded, tmp_path / place, resume=resume), said)
 
 
 @pytest.mark.parametrize(
@@ -202,10 +166,7 @@ def test_a_file_in_the_place_of_the_training_is_one_line(resume, recorded, tmp_p
         ({"policy_options": ("chunk_size",)}, "expected key=value"),
         ({"policy_options": ("chunk_size=many",)}, "policy act: .*chunk_size"),
         ({"policy_options": ("n_action_steps=500",)}, "policy act: .*n_action_steps"),
-        (
-            {"policy_options": ("n_action_steps=5", "temporal_ensemble_coeff=0.01")},
-            "policy act: .*ensembling",
-        ),
+        ({"policy_options": ("n_action_steps=5", "temporal_ensemble_coeff=0.01")}, "policy act: .*ensembl"),
         ({"device": "tpu"}, "expected one of cpu"),
         ({"images": True}, "expected cameras"),
         ({"scene": False}, "--no_scene: expected --images too"),
@@ -216,26 +177,21 @@ def test_a_file_in_the_place_of_the_training_is_one_line(resume, recorded, tmp_p
     ],
 )
 def test_wrong_settings_are_one_line_and_leave_nothing(settings, said, recorded, tmp_path):
-    config = dataclasses.replace(tiny(recorded, tmp_path / "policy", policy_options=()), **settings)
-    with pytest.raises(HandrailError, match=said) as error:
-        train(config, quiet=True)
-    assert "\n" not in str(error.value)
+    refused(tiny(recorded, tmp_path / "policy", **({"policy_options": ()} | settings)), said)
     assert not (tmp_path / "policy").exists()
 
 
 def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
     folder, config = trained
-    with pytest.raises(HandrailError, match="say --resume or --overwrite"):
-        train(config, quiet=True)
-    with pytest.raises(HandrailError, match="--resume with --seed 5: expected 0"):
-        train(dataclasses.replace(config, resume=True, seed=5), quiet=True)
+    refused(config, "say --resume or --overwrite")
+    refused(dataclasses.replace(config, resume=True, seed=5), "--resume with --seed 5: expected 0")
     assert train(dataclasses.replace(config, resume=True), quiet=True) == folder  # already there
     for name in ("thesis.tex", "checkpoints/thesis.tex"):
         thesis = tmp_path / name.replace("/", "-") / name
         thesis.parent.mkdir(parents=True)
         thesis.touch()
-        with pytest.raises(HandrailError, match=f"missing or empty folder, found {name}"):
-            train(tiny(recorded, tmp_path / name.replace("/", "-"), overwrite=True), quiet=True)
+        config = tiny(recorded, tmp_path / name.replace("/", "-"), overwrite=True)
+        refused(config, f"missing or empty folder, found {name}")
         assert thesis.exists()
 
 
@@ -244,12 +200,6 @@ def test_no_source_patches_another_library_s_names():
     files = [path for floor in floors for path in (ROOT / floor).rglob("*.py")]
     assert len(files) > 100
     assert [path.name for path in files if "unittest.mock" in path.read_text()] == []
-
-
-def test_the_command_says_bad_input_in_one_line():
-    done = command("--dataset.root", "nowhere", name="train")
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.slow

@@ -5,11 +5,11 @@ import shutil
 
 import numpy as np
 import pytest
+from canned import canned
 from hypothesis import given
 from hypothesis import strategies as st
-from training_helpers import tiny, weights, write_dataset
+from training_helpers import refused, tiny, weights, write_dataset
 
-from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.imitation.training.selection import hold_out
@@ -21,8 +21,8 @@ FLAT = {"eval_split": 0.1, "eval_steps": 2, "patience": 1, "improvement": 0.5, "
 
 
 @pytest.fixture(scope="session")
-def many(tmp_path_factory):
-    return write_dataset(tmp_path_factory.mktemp("many") / "set", lengths=(9, 7, 8, 6, 5, 9, 8))
+def many():
+    return canned(write_dataset, lengths=(9, 7, 8, 6, 5, 9, 8))
 
 
 @pytest.fixture(scope="session")
@@ -74,8 +74,8 @@ def test_episodes_are_held_out_by_draw_alone_and_none_twice(episodes, share, hel
 
 
 def test_too_few_episodes_to_hold_some_out_is_one_line(recorded, tmp_path):
-    with pytest.raises(HandrailError, match=r"--eval_split 0\.1: expected more than 5 episodes"):
-        train(tiny(recorded, tmp_path / "policy", eval_split=0.1), quiet=True)
+    config = tiny(recorded, tmp_path / "policy", eval_split=0.1)
+    refused(config, r"--eval_split 0\.1: expected more than 5 episodes")
     assert not (tmp_path / "policy").exists()
 
 
@@ -138,5 +138,4 @@ def test_cut_off_anywhere_it_ends_the_same_to_the_bit(flat, tmp_path):
     ],
 )
 def test_wrong_settings_are_one_line(settings, said, recorded, tmp_path):
-    with pytest.raises(HandrailError, match=said):
-        train(tiny(recorded, tmp_path / "policy", **settings), quiet=True)
+    refused(tiny(recorded, tmp_path / "policy", **settings), said)

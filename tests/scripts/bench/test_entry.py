@@ -11,7 +11,7 @@ WRONG = {
     "cases": ("d", "unknown case 'd'"),
     "speed": ("--updates 1", "--updates: expected"),
     "operators": ("--tasks juggle", "unknown task 'juggle'"),
-    "rl": ("--gamma 2", "--gamma 2.0: expected"),
+    "rl": ("--gamma 2", "--gamma: expected"),
     "latency": ("--browser /none", "--browser /none: expected a program"),
     "scaling": ("--workers x", "--workers x: expected"),
     "soak": ("--hours nan", "--hours: expected"),
