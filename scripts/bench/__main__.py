@@ -57,13 +57,13 @@ BENCHES = {
     ),
     "latency": Bench(
         "how soon the robot does what the cockpit's page asks",
-        "latency.config:LatencyConfig",
+        "latency.measure:LatencyConfig",
         "latency.measure:main",
     ),
     "scaling": Bench(
-        "episodes a second with several workers", "scaling.config:ScalingConfig", "scaling.scaling:main"
+        "episodes a second with several workers", "scaling.scaling:ScalingConfig", "scaling.scaling:main"
     ),
-    "soak": Bench("hours of commands and faults", "soak.config:SoakConfig", "soak.soak:main"),
+    "soak": Bench("hours of commands and faults", "soak.soak:SoakConfig", "soak.soak:main"),
 }
 
 

@@ -86,9 +86,9 @@ def write_dataset(
 
 def tiny(root: Path, output: Path, *options: str, **settings) -> TrainConfig:
     """Return the settings of a training of a moment."""
-    source = StoredConfig("handrail/test", str(root))
-    size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)} | settings
-    return TrainConfig(source, str(output), **size)
+    source = {"dataset": StoredConfig("handrail/test", str(root)), "output": str(output)}
+    size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)}
+    return TrainConfig(**(source | size | settings))
 
 
 def refused(config: TrainConfig, words: str) -> None:

@@ -45,9 +45,7 @@ class EvaluationFile:
                     f"{where}: expected {before}, got {condition.conditions}; say another --label"
                 )
             if entry and entry.get("checkpoint") != checkpoint.digest:
-                raise HandrailError(
-                    f"{where}: has another policy of dataset draw, seed {checkpoint.key}"
-                )
+                raise HandrailError(f"{where}: has another policy of dataset draw, seed {checkpoint.key}")
 
     def done(self, condition: PolicyCondition) -> set[int]:
         """Return the seeds that have been run."""

@@ -103,8 +103,9 @@ def read_meta(folder: Path) -> PolicyMeta:
     """Return what `handrail.json` in a `pretrained_model` folder says."""
     path = folder / NAME
     content = load_json(path, "a policy of handrail-train")
-    if not isinstance(content, dict) or content.pop("format", None) != FORMAT:
-        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {shown(content)}")
+    said = content.pop("format", None) if isinstance(content, dict) else content
+    if said != FORMAT:
+        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {shown(said)}")
     meta = decoded(content, PolicyMeta, repr(str(path)))
     written = meta.interface.actions if meta.interface else "recorded"
     if meta.actions != written or (written == "intent" and not meta.mode):

@@ -7,18 +7,20 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import psutil
+from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.typed import Count
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.scripts.bench.latency.clients import DrivingPage, Spectator
-from handrail.scripts.bench.latency.config import LatencyConfig
-from handrail.scripts.bench.report import machine, report, spread
+from handrail.scripts.bench.report import ReportConfig, machine, report, spread
 
 FPS = 20  # [Hz]
 _SLOW_PAUSE = 0.2  # of a page that takes things slowly [s]
@@ -36,6 +38,34 @@ _RATES = {
     "spectator_frames_hz": "spectator: frames a second",
     "spectator_pictures_hz": "spectator: pictures a second and camera",
 }
+
+
+@dataclass(frozen=True)
+class LatencyConfig(ReportConfig):
+    """Measure how soon the robot does what a page asks, and whether its loop keeps time, also under load."""
+
+    seconds: Annotated[int, Meta(ge=5)] = 30
+    """How long each case is driven [s]."""
+    spectators: Annotated[int, Meta(ge=0, le=30)] = 4
+    """Pages that watch."""
+    overload: bool = True
+    """Also measure with a busy program on every core, and pages that take what they are sent slowly."""
+    slow_spectators: Annotated[int, Meta(ge=0, le=30)] = 20
+    """How many of these."""
+    browser: str = ""
+    """Also measure with a browser that watches: where Chromium is, such as /usr/bin/chromium."""
+    image_size: Count = 320
+    """Height and width of the two cameras' pictures [pixels]; 0 for no cameras."""
+    seed: Count = 0
+    """Of the times at which a key is pressed."""
+
+    def check(self) -> None:
+        """Check the settings."""
+        super().check()
+        if self.spectators + self.slow_spectators > 30:
+            raise HandrailError("--spectators and --slow_spectators: expected at most 30 together")
+        if self.browser and not os.access(self.browser, os.X_OK):
+            raise HandrailError(f"--browser {self.browser}: expected a program, such as /usr/bin/chromium")
 
 
 def family(process: int) -> dict[int, str]:

@@ -1,6 +1,5 @@
 """LeRobot's evaluation on our environment, its rollouts of our robot, and ours move the robot alike."""
 
-import dataclasses
 import re
 import shlex
 import shutil
@@ -11,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from canned import canned, record_by_command
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.envs.factory import make_env, make_env_config, make_env_pre_post_processors
 from lerobot.policies.factory import make_policy, make_pre_post_processors
@@ -20,7 +20,6 @@ from places import ROOT
 from training_helpers import tiny
 
 import handrail.policies.lerobot  # noqa: F401  (as LeRobot's command line has it)
-from handrail.collect.config import StoredConfig
 from handrail.collect.lerobot import HandrailSim
 from handrail.collect.seeds import FIRST_SEED
 from handrail.controllers.errors import HandrailError
@@ -53,13 +52,8 @@ class Trace:
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    from command_helpers import command
-
-    root = tmp_path_factory.mktemp("evaluated") / "set"
-    done = command(root, "--task", "reach", "--dataset.num_episodes", 2)
-    assert done.returncode == 0, done.stderr
-    return root
+def recorded():
+    return canned(record_by_command, "--task reach --dataset.num_episodes 2")
 
 
 @pytest.fixture(scope="module")
@@ -194,8 +188,7 @@ def run(monkeypatch, module, *words):
 
 
 def trained(root, output, actions):
-    settings = tiny(root, output, actions=actions, steps=40)
-    return train(dataclasses.replace(settings, dataset=StoredConfig("me/set", str(root))), quiet=True)
+    return train(tiny(root, output, actions=actions, steps=40), quiet=True)
 
 
 def both(folder, environment, **settings):
