@@ -203,7 +203,7 @@ class Cockpit:
         said: dict[str, Any] = {
             "shapes": stage.shapes(compiled),
             "meshes": digest,
-            "task": env.task_description,
+            "task": env.task.description,
             "horizon": env.task.horizon,
             "robot": robot.name,
             "channels": channels.names,

@@ -155,7 +155,7 @@ class Snapshots:
             return shown
         status = frame.diagnostics.status
         shown["undos"], shown["status"] = frame.undos, status.value
-        shown["reason"] = reason(status, self._env.world.contacts, q, model.description)
+        shown["reason"] = reason(status, self._env.plant.contacts, q, model.description)
         if hand := hand_ahead(model, frame.intent, view.tool, q):
             shown["ghost"] = _numbers(hand)
         if (base := base_ahead(model, frame.intent, q)) is not None:

@@ -50,7 +50,7 @@ class Recording:
     ) -> None:
         self._config, self._env, self._people = config, env, people
         self.columns = session_columns(config)
-        self._recorder = Recorder(config.dataset.single_task or env.task_description, self.columns)
+        self._recorder = Recorder(config.dataset.single_task or env.task.description, self.columns)
         self._observers: list[Any] = [self._recorder, *displays, *people]
         self._session = build_session(config, env, self._observers, config.dataset.fps, *people)
 

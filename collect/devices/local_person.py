@@ -81,7 +81,7 @@ class LocalPerson:
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Show the task of a new episode."""
-        self._card.begin(env.task_description, env.task.horizon)
+        self._card.begin(env.task.description, env.task.horizon)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""

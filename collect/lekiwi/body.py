@@ -70,14 +70,14 @@ class LeKiwiBody:
 
     def advance(self, until: float) -> None:
         """Let time pass, until so long after the episode's beginning [s]; at most half a second at once."""
-        steps = math.floor((until - self._env.world.time) * self._env.fps + 1e-6)
+        steps = math.floor((until - self._env.plant.time) * self._env.fps + 1e-6)
         for _ in range(min(steps, math.ceil(_AT_ONCE * self._env.fps))):
             self._step()
 
     @property
     def time(self) -> float:
         """Since the episode began [s]."""
-        return self._env.world.time
+        return self._env.plant.time
 
     @property
     def base(self) -> FloatArray:
@@ -91,7 +91,7 @@ class LeKiwiBody:
 
     def observation(self) -> dict[str, float]:
         """Return what LeKiwi says: joint positions, and the speeds of its wheels as the base's."""
-        state, world = self._env.state(), self._env.world
+        state, world = self._env.state(), self._env.plant
         twist = turned(state.v[:3], -state.q[2])
         return self._units.action(state.q[3:], state.v[3:], twist, 1.0 - world.opening)
 
@@ -116,4 +116,4 @@ class LeKiwiBody:
         self.contacts += len(touching - self._touching)
         self._touching = touching
         if info["is_success"] and math.isnan(self.done_at):
-            self.done_at = self._env.world.time
+            self.done_at = self._env.plant.time

@@ -61,7 +61,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     @property
     def task_description(self) -> str:
         """One sentence: what is to be done."""
-        return self._env.task_description
+        return self._env.task.description
 
     task = task_description  # LeRobot asks for both
 

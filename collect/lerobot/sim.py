@@ -202,7 +202,7 @@ class HandrailSim(Uncalibrated, Robot):
         self._check_connected()
         self._report()
         self._connected = False
-        self.env.robot.stop()
+        self.env.plant.stop()
         self._open.close()
 
     def _begin(self, scene: int) -> None:

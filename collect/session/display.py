@@ -48,7 +48,7 @@ class Drawing:
     def see(self, frame: Frame) -> None:
         """Log one moment."""
         rr, model, diagnostics = self._rr, self._env.model, frame.diagnostics
-        time, self._time = self._time, self._env.world.time
+        time, self._time = self._time, self._env.plant.time
         rr.set_time("time", duration=time)
         for mover in self._env.start.scene.movers:
             self._log_shape(f"world/scene/{mover.name}", mover.obstacle(time))

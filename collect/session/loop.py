@@ -122,7 +122,7 @@ class EpisodeLoop:
             seed: of the environment.
         """
         observation, info = self.env.reset(seed=seed)
-        self._controller.reset(self.env.world.obstacles())
+        self._controller.reset(self.env.plant.obstacles())
         tally = Tally(seed or 0, self.env.period)
         self.now = Moment(observation, info, tally, self._view(observation), self._holds)
         for disturbance in self._disturbances:
@@ -185,7 +185,7 @@ class EpisodeLoop:
         """Come back to where the episode stood; the clock and what was spent go on."""
         world, then = checkpoint
         observation, info = self.env.restore(world)
-        self._controller.reset(self.env.world.obstacles())
+        self._controller.reset(self.env.plant.obstacles())
         tally = self.tally.back_to(then.tally)
         self.now = replace(then, observation=observation, info=info, tally=tally, holding=self._holds)
         self.now.asked, self.now.due = tally.frames, self.time
@@ -200,7 +200,7 @@ class EpisodeLoop:
         if self.time >= now.due - ROUNDING:
             before, now.holding = now.holding, self._holds
             if self.env.start.scene.movers or now.holding or before:
-                self._controller.update_scene(self.env.world.obstacles())
+                self._controller.update_scene(self.env.plant.obstacles())
             now.command = self._controller.update(now.view.state, intent)
             now.asked, now.due = step, now.due + self.control_period
             self.tally.updated(now.command)
@@ -209,7 +209,7 @@ class EpisodeLoop:
 
     @property
     def _holds(self) -> bool:
-        return bool(self.env.world.held())
+        return bool(self.env.plant.held())
 
     def _view(self, observation: Observation) -> View:
-        return View(self.env.robot.state(), self.env.task_state(), observation)
+        return View(self.env.plant.state(), self.env.task_state(), observation)

@@ -146,7 +146,7 @@ class Session:
             try:
                 ended_by = self._until_over(loop)
             finally:
-                self.env.robot.stop()
+                self.env.plant.stop()
                 self._warn_if_slow(loop)
         return loop.tally.outcome(loop.now.info, ended_by, not self.env.real)
 

@@ -65,7 +65,7 @@ class Driving:
         self._recording.warm_up(seed)
         mask = channels.mask(*modes[mode].groups("hand")) | channels.mask(*modes[mode].groups("base"))
         owned = tuple(name for name, own in zip(channels.names, mask, strict=True) if own)
-        return Briefing(env.task_description, modes[mode].help, owned)
+        return Briefing(env.task.description, modes[mode].help, owned)
 
     def run(self, step: Step, seed: int) -> Outcome:
         """Run a trial, or one of practice, and return how it went."""

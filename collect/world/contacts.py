@@ -1,41 +1,49 @@
 """Looks at contacts: those that a robot should not have, and those by which it holds a thing."""
 
-from collections.abc import Iterable
-
 import numpy as np
 
+from handrail.collect.world.geometry import ROBOT_BIT
 from handrail.collect.world.gl import MjData, MjModel
-from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.collect.world.gripper import FINGERS
+from handrail.collect.world.scene import Scene
+from handrail.controllers.arrays import FloatArray
 
-_SCENE, _ROBOT, _GRASP, _MOVABLE = range(4)
+_ROBOT, _GRASP, _MOVABLE = 1, 2, 3  # kinds of geoms; 0 is the scene
 
 
-class ContactMonitor:
-    """Collects forbidden contacts: the robot with anything but fingers or palm with a movable thing.
+class Contacts:
+    """Collects forbidden contacts, and sees what the fingers hold: what they press from opposite sides.
 
-    The robot's contacts with itself count; its wheels' with the floor do not exist in the model.
+    Forbidden is the robot with anything, but fingers or palm with a movable thing. The robot's contacts with
+    itself count; its wheels' with the floor do not exist in the model.
+
+    Args:
+        model: the compiled model.
+        scene: what stands around the robot.
+        grasp: names of the geoms that may touch movable things.
+        grips: whether there are fingers that can hold something.
     """
 
-    def __init__(
-        self, model: MjModel, robot: Iterable[str], grasp: Iterable[str], movable: Iterable[str]
-    ) -> None:
+    def __init__(self, model: MjModel, scene: Scene, grasp: tuple[str, ...], grips: bool) -> None:
         self._model = model
-        kinds = np.zeros(model.ngeom, dtype=np.intp)
-        for names, kind in ((robot, _ROBOT), (grasp, _GRASP)):
-            kinds[[model.geom(name).id for name in names]] = kind
-        bodies = [model.body(name).id for name in movable]
-        kinds[np.isin(model.geom_bodyid, bodies)] = _MOVABLE
-        self._forbidden = _forbidden_pairs()[np.ix_(kinds, kinds)]
+        kinds = np.where(model.geom_contype == ROBOT_BIT, _ROBOT, 0)
+        kinds[[model.geom(name).id for name in grasp]] = _GRASP
+        bodies = {item.name: int(model.body(item.name).id) for item in scene.movables}
+        kinds[np.isin(model.geom_bodyid, list(bodies.values()))] = _MOVABLE
+        forbidden = np.zeros((4, 4), dtype=bool)
+        forbidden[(_ROBOT, _GRASP), :] = forbidden[:, (_ROBOT, _GRASP)] = True
+        forbidden[_GRASP, _MOVABLE] = forbidden[_MOVABLE, _GRASP] = False
+        self._forbidden = forbidden[np.ix_(kinds, kinds)]
         self._pairs: set[tuple[int, int]] = set()
+        self._fingers = [model.geom(name).id for name in FINGERS] if grips else []
+        self._portable = {bodies[item.name]: item.name for item in scene.movables if item.portable}
 
     def clear(self) -> None:
-        """Forget the contacts so far."""
+        """Forget the forbidden contacts so far."""
         self._pairs.clear()
 
     def look(self, data: MjData) -> None:
-        """Remember the forbidden contacts of this instant."""
-        if data.ncon == 0:
-            return
+        """Remember the forbidden contacts of this instant, of which there are some contacts."""
         first, second = data.contact.geom.T
         hit = self._forbidden[first, second]
         if hit.any():
@@ -44,27 +52,8 @@ class ContactMonitor:
     @property
     def names(self) -> tuple[str, ...]:
         """The pairs of geoms that met since the last `clear`, sorted."""
-        if not self._pairs:
-            return ()
-        pairs = (
-            (self._model.geom(first).name, self._model.geom(second).name) for first, second in self._pairs
-        )
-        return tuple(sorted(" – ".join(sorted(pair)) for pair in pairs))
-
-
-class GraspMonitor:
-    """Sees which things the fingers hold: those that they press from opposite sides.
-
-    Args:
-        model: the compiled model.
-        fingers: names of the geoms of the two; none of a robot without a gripper.
-        portable: names of the bodies that can be carried.
-    """
-
-    def __init__(self, model: MjModel, fingers: Iterable[str], portable: Iterable[str]) -> None:
-        self._bodies = model.geom_bodyid
-        self._fingers = [model.geom(name).id for name in fingers]
-        self._portable = {int(model.body(name).id): name for name in portable}
+        pairs = (sorted(self._model.geom(geom).name for geom in pair) for pair in self._pairs)
+        return tuple(sorted(" – ".join(pair) for pair in pairs))
 
     def held(self, data: MjData) -> tuple[str, ...]:
         """Return the names of what is held at this instant."""
@@ -83,15 +72,6 @@ class GraspMonitor:
         for pair, frame in zip(data.contact.geom, data.contact.frame, strict=True):
             if finger in pair:
                 other, sign = (pair[1], 1.0) if pair[0] == finger else (pair[0], -1.0)
-                body = int(self._bodies[other])
+                body = int(self._model.geom_bodyid[other])
                 pushes[body] = pushes.get(body, 0.0) + sign * frame[:3]
         return pushes
-
-
-def _forbidden_pairs() -> BoolArray:
-    """Return which kinds may not touch, (4, 4)."""
-    forbidden = np.zeros((4, 4), dtype=bool)
-    forbidden[(_ROBOT, _GRASP), :] = True
-    forbidden[:, (_ROBOT, _GRASP)] = True
-    forbidden[_GRASP, _MOVABLE] = forbidden[_MOVABLE, _GRASP] = False
-    return forbidden

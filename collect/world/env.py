@@ -12,7 +12,7 @@ from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.world.observation import AgentObservation, bounded, box_space
-from handrail.collect.world.plant import Plant, Robot, Seeing, World
+from handrail.collect.world.plant import Plant, Seeing
 from handrail.collect.world.rendering import CAMERAS, Painter
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Start, Task, TaskState, Verdict
@@ -47,10 +47,9 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         real: whether a step takes its time, as of a robot that is no simulation: there is no way back.
 
     Attributes:
-        real: as it was said.
-        task: what is to be done.
+        task, fps, cameras, image_size, render_size, real: as they were said.
         model: kinematics of the robot.
-        fps: steps a second.
+        period: from one step to the next [s].
         agent_names: names of the numbers in `agent_pos`.
         state_names: names of the numbers in `environment_state`.
     """
@@ -72,79 +71,40 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         observes: bool = True,
         real: bool = False,
     ) -> None:
-        _check(fps, cameras, render_mode)
-        self.real = real
+        if not 10 <= fps <= 100:
+            raise HandrailError(f"fps {fps}: expected 10 to 100 steps a second")
+        for camera in cameras:
+            if camera not in CAMERAS:
+                raise unknown_name("camera", camera, CAMERAS)
+        if render_mode not in (None, "rgb_array"):
+            raise unknown_name("render mode", render_mode, ("rgb_array",))
         self.task: Task = load_env_creator(task)() if isinstance(task, str) else task  # pyright: ignore
         self.model: RobotModel = robot if isinstance(robot, RobotModel) else load_model(robot)
-        self.fps = fps
-        self.cameras = tuple(cameras)
-        self.image_size = (int(image_size[0]), int(image_size[1]))
-        self.render_mode = render_mode
-        self.render_size = (int(render_size[0]), int(render_size[1]))
+        self.fps, self.period, self.real = fps, 1.0 / fps, real
+        self.cameras, self.image_size = tuple(cameras), image_size
+        self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
         self._build, self._observes = plant, observes
         self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)
-        self.agent_names = self._agent.names
-        self.state_names = self.task.state_names
-        self.action_space = self._action_space()
-        self.observation_space = self._observation_space()
-        self._painters: dict[str, Painter] = {}
-        self._begun: tuple[Start, Plant] | None = None
-        self._steps = 0
-
-    def _action_space(self) -> spaces.Space[Any]:
+        self.agent_names, self.state_names = self._agent.names, self.task.state_names
         limit = np.append(self.model.description.limits.velocity, 1.0).astype(np.float32)
-        low = -limit
-        low[-1] = 0.0
-        return spaces.Box(low, limit, dtype=np.float32)
-
-    def _observation_space(self) -> spaces.Dict:
-        parts: dict[str, spaces.Space[Any]] = {
+        self.action_space = spaces.Box(np.append(-limit[:-1], np.float32(0.0)), limit, dtype=np.float32)
+        seen = {
             "agent_pos": box_space(len(self.agent_names)),
             "environment_state": box_space(len(self.state_names)),
         }
         if self.cameras:
             picture = spaces.Box(0, 255, (*self.image_size, 3), np.uint8)
-            parts["pixels"] = spaces.Dict(dict.fromkeys(self.cameras, picture))
-        return spaces.Dict(parts)
+            seen["pixels"] = spaces.Dict(dict.fromkeys(self.cameras, picture))
+        self.observation_space = spaces.Dict(seen)
+        self._painters: dict[str, Painter] = {}
+        self._begun: tuple[Start, Plant] | None = None
+        self._steps = 0
 
     @property
-    def task_description(self) -> str:
-        """One sentence: what is to be done."""
-        return self.task.description
-
-    @property
-    def period(self) -> float:
-        """From one step to the next [s]."""
-        return 1.0 / self.fps
-
-    @property
-    def robot(self) -> Robot:
-        """The robot of this episode."""
-        return self._present
-
-    @property
-    def world(self) -> World:
-        """What is around it, and the truth by which the task judges."""
-        return self._present
-
-    @property
-    def simulation(self) -> Simulation:
-        """The physics of this episode, to be drawn or pushed."""
-        if not isinstance(self._present, Simulation):
-            raise HandrailError(
-                f"environment {type(self.task).__name__}: expected physics, got an ideal robot"
-            )
-        return self._present
-
-    @property
-    def _present(self) -> Plant:
-        return self._now[1]
-
-    @property
-    def _now(self) -> tuple[Start, Plant]:
+    def _episode(self) -> tuple[Start, Plant]:
         if self._begun is None:
             raise HandrailError(f"environment {type(self.task).__name__}: call reset() before anything else")
         return self._begun
@@ -152,27 +112,41 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     @property
     def start(self) -> Start:
         """How this episode began."""
-        return self._now[0]
+        return self._episode[0]
+
+    @property
+    def plant(self) -> Plant:
+        """The robot of this episode, and the world around it."""
+        return self._episode[1]
+
+    @property
+    def simulation(self) -> Simulation:
+        """The physics of this episode, to be drawn or pushed."""
+        if not isinstance(self.plant, Simulation):
+            raise HandrailError(
+                f"environment {type(self.task).__name__}: expected physics, got an ideal robot"
+            )
+        return self.plant
 
     def state(self) -> State:
         """Return the measured positions, velocities and time, and the velocity sent last."""
-        return self.robot.state()
+        return self.plant.state()
 
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what a controller has to avoid besides the floor, where it is now and how fast it moves.
 
         What the fingers hold is among it; its position and rotation are in the frame that it names.
         """
-        return self.world.obstacles()
+        return self.plant.obstacles()
 
     def task_state(self) -> TaskState:
         """Return the truth of this moment."""
-        now = self.world
+        start, now = self._episode
         return TaskState(
             time=now.time,
             tool=now.tool,
             opening=now.opening,
-            start=self.start,
+            start=start,
             poses=now.poses(),
             still=now.still(),
             stable=now.is_stable,
@@ -192,86 +166,71 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         start: Start = (options or {}).get("start") or self._sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
         plant = self._build(self.model, start.scene, start.q, self.period, meshes=meshes, grip=start.grip)
-        self._begun = start, plant
-        self._steps = 0
-        state = self.task_state()
-        rest = np.append(np.zeros(self.model.size), float(start.grip is not None)).astype(np.float32)
-        return self._observe(state), self._info(state, Verdict(), rest)
+        self._begun, self._steps = (start, plant), 0
+        rest = np.append(np.zeros(self.model.size), float(start.grip is not None))
+        return self._shown(self.task_state(), rest.astype(np.float32))
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move for 1/fps seconds; the reward is 1 at success. `info["sent"]` is the action that was sent."""
-        sent = self.robot.send(action)
+        sent = self.plant.send(action)
         self._steps += 1
         state = self.task_state()
-        outcome = self.task.outcome(state) if state.stable else Verdict(failure="unstable")
-        truncated = not outcome.over and self._steps >= self._max_episode_steps
+        verdict = self.task.outcome(state) if state.stable else Verdict(failure="unstable")
+        truncated = not verdict.over and self._steps >= self._max_episode_steps
         if truncated:
-            outcome = Verdict(failure="timeout")
-        info = self._info(state, outcome, sent)
-        return self._observe(state), float(outcome.success), outcome.over and not truncated, truncated, info
+            verdict = Verdict(failure="timeout")
+        observation, info = self._shown(state, sent, verdict)
+        return observation, float(verdict.success), verdict.over and not truncated, truncated, info
 
-    def _observe(self, state: TaskState) -> Observation:
+    def _shown(
+        self, state: TaskState, sent: NDArray[np.floating[Any]], verdict: Verdict | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Return observation and info of a moment: the one place where they are assembled."""
+        verdict, contacts = verdict or Verdict(), self.plant.contacts
+        info = {
+            "is_success": verdict.success,
+            "failure_reason": verdict.failure,
+            "sent": sent,
+            "contacts": len(contacts),
+            "contact_names": contacts,
+            "time": state.time,
+        }
         if not self._observes:
-            return {"agent_pos": _NOTHING, "environment_state": _NOTHING}
+            return {"agent_pos": _NOTHING, "environment_state": _NOTHING}, info
         observation: Observation = {
             "agent_pos": self._agent.read(self.state(), state.tool, state.opening),
             "environment_state": bounded(self.task.features(state)),
         }
         if self.cameras:
             observation["pixels"] = self._pictures()
-        return observation
+        return observation, info
 
     def _pictures(self) -> Mapping[str, NDArray[np.uint8]]:
-        if isinstance(self._present, Seeing):
-            return self._present.pictures(self.cameras, self.image_size)
-        return {camera: self._paint("pixels", camera) for camera in self.cameras}
-
-    def _info(self, state: TaskState, outcome: Verdict, sent: NDArray[np.floating[Any]]) -> dict[str, Any]:
-        contacts = self.world.contacts
-        return {
-            "is_success": outcome.success,
-            "failure_reason": outcome.failure,
-            "sent": sent,
-            "contacts": len(contacts),
-            "contact_names": contacts,
-            "time": state.time,
-        }
+        if isinstance(self.plant, Seeing):
+            return self.plant.pictures(self.cameras, self.image_size)
+        return {camera: self._paint("pixels", camera, self.image_size) for camera in self.cameras}
 
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""
-        return self.world.checkpoint(), self._steps
+        return self.plant.checkpoint(), self._steps
 
     def restore(self, checkpoint: Any) -> tuple[Observation, dict[str, Any]]:
         """Come back to where the episode stood; from there all goes on as it did."""
         plant, self._steps = checkpoint
-        self.world.restore(plant)
-        state = self.task_state()
-        sent = np.append(self.robot.state().commanded, 0.0).astype(np.float32)
-        return self._observe(state), self._info(state, Verdict(), sent)
+        self.plant.restore(plant)
+        return self._shown(self.task_state(), np.append(self.state().commanded, 0.0).astype(np.float32))
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a good-looking picture from the scene camera, if `render_mode` is `rgb_array`."""
-        return self._paint("render", "scene") if self.render_mode else None
+        return self._paint("render", "scene", self.render_size) if self.render_mode else None
 
-    def _paint(self, use: str, camera: str) -> NDArray[np.uint8]:
+    def _paint(self, use: str, camera: str, size: tuple[int, int]) -> NDArray[np.uint8]:
         now = self.simulation
-        if use not in self._painters:
-            pretty = use == "render"
-            size = self.render_size if pretty else self.image_size
-            self._painters[use] = Painter(size, pretty)
-        return self._painters[use].paint(now.mujoco_model, now.data, camera)
+        painter = self._painters.get(use) or Painter(size, pretty=use == "render")
+        self._painters[use] = painter
+        return painter.paint(now.mujoco_model, now.data, camera)
 
     def close(self) -> None:
         """Give the OpenGL contexts back."""
         while self._painters:
             self._painters.popitem()[1].close()
-
-
-def _check(fps: float, cameras: Sequence[str], render_mode: str | None) -> None:
-    if not 10 <= fps <= 100:
-        raise HandrailError(f"fps {fps}: expected 10 to 100 steps a second")
-    for camera in cameras:
-        if camera not in CAMERAS:
-            raise unknown_name("camera", camera, CAMERAS)
-    if render_mode not in (None, "rgb_array"):
-        raise unknown_name("render mode", render_mode, ("rgb_array",))

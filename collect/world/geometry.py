@@ -18,25 +18,30 @@ _TYPES = {
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
 }
 
-# Who may touch whom: a pair collides when one's type meets the other's affinity.
+# Who may touch whom: a pair collides when one's type meets the other's affinity; the floor's: `stage.xml`.
 SCENE_BIT, ROBOT_BIT, FLOOR_BIT = 1, 2, 4
 VISIBLE_GROUP, HIDDEN_GROUP = 1, 3
+UNTOUCHED = {"contype": 0, "conaffinity": 0}
 
 
 def geom_shape(shape: Shape) -> dict[str, Any]:
     """Return the `type` and `size` of a geom; MuJoCo takes half lengths."""
     size = np.zeros(3)
     size[: len(shape.size)] = shape.size
-    if shape.kind == "box":
-        size /= 2.0
-    elif shape.kind in ("capsule", "cylinder"):
-        size[1] /= 2.0
-    return {"type": _TYPES[shape.kind], "size": size}
+    return {
+        "type": _TYPES[shape.kind],
+        "size": size / ([2.0] * 3 if shape.kind == "box" else [1.0, 2.0, 1.0]),
+    }
 
 
 def pose(translation: FloatArray, rotation: FloatArray) -> dict[str, Any]:
     """Return the `pos` and `quat` of a body, geom, site or camera."""
     return {"pos": np.array(translation), "quat": quaternion_from_matrix(rotation)}
+
+
+def camera_pose(position: FloatArray, right: FloatArray, forward: FloatArray) -> dict[str, Any]:
+    """Return the pose of a camera that looks forward, (3,) each; MuJoCo's look along their −z with y up."""
+    return pose(position, np.column_stack([right, np.cross(right, forward), -forward]))
 
 
 def set_box_inertia(body: MjsBody, mass: float, size: ArrayLike, centre: ArrayLike = (0.0, 0.0, 0.0)) -> None:

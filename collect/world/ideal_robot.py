@@ -19,7 +19,7 @@ _FAR = 0.15  # a pair that stays farther apart than this need not be measured ex
 
 
 class IdealRobot:
-    """Integrates what it is sent; shapes that overlap count as contacts. A robot and a world.
+    """A plant that integrates what it is sent; shapes that overlap count as contacts.
 
     Args:
         model: of the robot.

@@ -125,13 +125,11 @@ class MinkController:
 def _shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
     """Return the controller's own shapes in MuJoCo, each a geom of its name."""
     from handrail.collect.world import geometry
-    from handrail.collect.world.gl import mujoco
     from handrail.collect.world.robot import build_robot
 
     hand = replace(model.description.end_effector, gripper=None)
     bare = RobotModel(replace(model.description, end_effector=hand))
-    spec = build_robot(bare, meshes=False).spec
-    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[8.0, 8.0, 0.1])
+    spec = build_robot(bare, meshes=False)
     for obstacle in obstacles:
         spec.worldbody.add_geom(
             name=obstacle.name,

@@ -1,5 +1,6 @@
 """An environment as numbers: the robot's part of the observation, and the obstacles."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,45 @@ from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle, Shape
 
-_TOOL = ("tool.x", "tool.y", "tool.z", "tool.qw", "tool.qx", "tool.qy", "tool.qz")
 _BOUND = 100.0  # nothing here is larger, in any unit
 MOST = 32  # things
 WIDTH = 21  # numbers of each: kind, lengths (3), position (3), rotation (9), velocity (3), work surface, held
-_KINDS = ("", "box", "capsule", "sphere", "cylinder")  # the first one: nothing is there
-_LENGTHS = {"box": 3, "capsule": 2, "sphere": 1, "cylinder": 2}
+_LENGTHS = {
+    "": 0,
+    "box": 3,
+    "capsule": 2,
+    "sphere": 1,
+    "cylinder": 2,
+}  # of a kind; the first: nothing is there
+_KINDS = list(_LENGTHS)
+
+
+def names_of(thing: str, quantities: tuple[str, ...] = ("x", "y", "z")) -> tuple[str, ...]:
+    """Return the names of a thing's numbers, of its position by default."""
+    return tuple(f"{thing}.{quantity}" for quantity in quantities)
+
+
+def pose_names(thing: str) -> tuple[str, ...]:
+    """Return the names of a thing's position and quaternion."""
+    return names_of(thing, ("x", "y", "z", "qw", "qx", "qy", "qz"))
+
+
+def pose_numbers(pose: Pose) -> FloatArray:
+    """Return position and quaternion, (7,)."""
+    return np.concatenate([pose.position, quaternion_from_matrix(pose.rotation)])
+
+
+def row_names(thing: str, count: int, quantities: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of the numbers of so many things of one kind."""
+    return tuple(name for index in range(count) for name in names_of(f"{thing}_{index}", quantities))
+
+
+def padded(rows: Iterable[ArrayLike], count: int, width: int) -> FloatArray:
+    """Return rows of numbers one after the other, zero for those that are missing, (count width,)."""
+    numbers = np.zeros((count, width))
+    for row, values in zip(numbers, rows, strict=False):
+        row[:] = values
+    return numbers.ravel()
 
 
 class AgentObservation:
@@ -29,22 +63,16 @@ class AgentObservation:
     """
 
     def __init__(self, model: RobotModel) -> None:
-        joints = model.joints
-        self.names = (
-            *(f"{name}.pos" for name in joints),
-            *(f"{name}.vel" for name in joints),
-            "gripper.opening",
-            *_TOOL,
-        )
+        positions, velocities = ([f"{name}.{kind}" for name in model.joints] for kind in ("pos", "vel"))
+        self.names = (*positions, *velocities, "gripper.opening", *pose_names("tool"))
         self._home = quaternion_from_matrix(model.pose(model.description.home).rotation)
 
     def read(self, state: State, tool: Pose, opening: float) -> NDArray[np.float32]:
         """Return the numbers, in the order of `names`."""
-        quaternion = quaternion_from_matrix(tool.rotation)
-        if quaternion @ self._home < 0:
-            quaternion = -quaternion
-        numbers = (state.q, state.v, [opening], tool.position, quaternion)
-        return bounded(np.concatenate(numbers))
+        pose = pose_numbers(tool)
+        if pose[3:] @ self._home < 0:
+            pose[3:] = -pose[3:]
+        return bounded(np.concatenate((state.q, state.v, [opening], pose)))
 
 
 def bounded(numbers: FloatArray) -> NDArray[np.float32]:
@@ -66,9 +94,8 @@ def to_numbers(obstacles: tuple[Obstacle, ...]) -> NDArray[np.float32]:
     for row, each in zip(rows, obstacles, strict=False):
         size = np.zeros(3)
         size[: len(each.shape.size)] = each.shape.size
-        parts = (size, each.position, each.rotation.ravel(), each.velocity)
-        flags = (each.work_surface, each.held)
-        row[:] = [_KINDS.index(each.shape.kind), *np.concatenate(parts), *flags]
+        parts = (size, each.position, each.rotation.ravel(), each.velocity, [each.work_surface, each.held])
+        row[:] = np.concatenate([[_KINDS.index(each.shape.kind)], *parts])
     return rows
 
 
@@ -88,12 +115,9 @@ def from_numbers(rows: ArrayLike) -> tuple[Obstacle, ...]:
 def _obstacle(name: str, row: NDArray[np.float64]) -> Obstacle:
     kind = _KINDS[int(row[0])]
     shape = Shape(kind, row[1 : 1 + _LENGTHS[kind]])  # pyright: ignore[reportArgumentType]
+    position, rotation, velocity = row[4:7], row[7:16].reshape(3, 3), row[16:19]
+    surface, held = row[19:] != 0
+    frame = "tool" if held else ""
     return Obstacle(
-        name,
-        shape,
-        position=row[4:7],
-        rotation=row[7:16].reshape(3, 3),
-        velocity=row[16:19],
-        work_surface=bool(row[19]),
-        frame="tool" if row[20] else "",
+        name, shape, position, rotation, velocity=velocity, work_surface=bool(surface), frame=frame
     )

@@ -14,8 +14,11 @@ from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
 
 
-class Robot(Protocol):
-    """Follows velocities, one command a period; the one owner of what it was sent last."""
+class Plant(Protocol):
+    """A robot that follows velocities, one command a period, and the world by whose truth a task judges.
+
+    It is the one owner of what the robot was sent last.
+    """
 
     def state(self) -> State:
         """Return the measured positions, velocities and time, and the velocity that was sent last."""
@@ -32,10 +35,6 @@ class Robot(Protocol):
 
     def stop(self) -> None:
         """Come to rest as fast as the limits allow, and stay there; the gripper stays as it is."""
-
-
-class World(Protocol):
-    """What is around the robot, and the truth by which a task judges."""
 
     def checkpoint(self) -> object:
         """Return the whole state, robot and things, to come back to."""
@@ -95,10 +94,6 @@ class Seeing(Protocol):
         ...
 
 
-class Plant(Robot, World, Protocol):
-    """A robot and its world in one, as a simulation has them."""
-
-
 class Gate:
     """Keeps what a robot is sent inside its limits, and remembers it; a robot has one.
 
@@ -129,14 +124,13 @@ class Gate:
             command: velocities [m/s, rad/s] and gripper, (n + 1,).
             q: where the robot is, (n,).
         """
-        size, asked = len(self.velocity), np.asarray(command, dtype=np.float64).ravel()
-        usable = asked.size == size + 1 and math.isfinite(asked[size])
-        target = asked[:size] if usable else np.full(size, np.nan)
+        *target, gripper = np.asarray(command, dtype=np.float64).ravel().tolist() or [math.nan]
+        usable = len(target) == len(self.velocity) and math.isfinite(gripper)
         if usable:
-            self.gripper = min(max(float(asked[size]), 0.0), 1.0)
-        velocity, _ = self._limiter.limit(self.velocity, target, self._period, q)
+            self.gripper = min(max(gripper, 0.0), 1.0)
+        velocity, _ = self._limiter.limit(self.velocity, np.array(target if usable else ()), self._period, q)
         sent = np.append(velocity, self.gripper).astype(self._precision)
-        self.velocity = sent[:size].astype(np.float64)
+        self.velocity = sent[:-1].astype(np.float64)
         return sent
 
     def state(self) -> tuple[FloatArray, float]:
@@ -147,7 +141,7 @@ class Gate:
         """Come back to a state."""
         self.velocity, self.gripper = state[0].copy(), state[1]
 
-    def bring_to_rest(self, robot: Robot) -> None:
+    def bring_to_rest(self, plant: Plant) -> None:
         """Send its robot nothing usable, which brakes, until it was sent rest."""
         while np.abs(self.velocity).max() > 0.0:
-            robot.send(())
+            plant.send(())

@@ -4,15 +4,14 @@ Every joint placement, axis and inertia comes from the pinocchio model, every co
 description, so that the simulated robot and the controller's cannot drift apart.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import pinocchio as pin
 
 from handrail.collect.world import geometry
 from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
-from handrail.collect.world.gripper import JAW, add_gripper
+from handrail.collect.world.gripper import FINGERS, add_gripper
 from handrail.collect.world.meshes import placed_meshes
+from handrail.collect.world.stage import new_stage
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel
@@ -20,112 +19,79 @@ from handrail.controllers.robot.parts import Gripper, PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes
 
 BASE_BODY = "planar_base"
-FINGERS = ("finger_left", "finger_right")
 _DRIVE_TIME = 0.0025  # [s]
+_AT_FRAME = Placement(np.zeros(3), np.eye(3))
 
 
-@dataclass(frozen=True)
-class SimulatedRobot:
-    """A robot in MuJoCo, to which a scene can be added.
-
-    Attributes:
-        spec: bodies, joints, actuators, cameras of the robot.
-        contact_geoms: names of its geoms that collide.
-        grasp_geoms: those that may touch movable things: fingers and palm.
-        finger_joints: names of the joints by which its fingers move; none where they do not.
-    """
-
-    spec: MjSpec
-    contact_geoms: tuple[str, ...]
-    grasp_geoms: tuple[str, ...]
-    finger_joints: tuple[str, ...]
-
-
-class Mounts:
-    """Where pinocchio's frames are in MuJoCo's tree; the bodies are by pinocchio's joint index."""
-
-    def __init__(self, model: RobotModel, bodies: list[MjsBody]) -> None:
-        self._model, self.bodies = model, bodies
-
-    def place(self, frame: str, placement: Placement) -> tuple[MjsBody, pin.SE3]:
-        """Return the body that carries something placed on a frame, and where that is on the body."""
-        mount = self._model.pinocchio.frames[self._model.frame_id(frame)]
-        on_frame = pin.SE3(np.array(placement.rotation), np.array(placement.translation))
-        return self.bodies[mount.parentJoint], mount.placement * on_frame
-
-
-def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> SimulatedRobot:
-    """Build the robot; without `meshes` it moves and collides alike, but is not for looking at.
+def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> MjSpec:
+    """Build the robot on an empty floor; without `meshes` it moves and collides alike.
 
     Args:
         model: of the robot.
-        meshes: whether to draw it as it looks.
+        meshes: whether to draw it, and what it stands on, as they look.
         grips: whether its fingers move; else they stay open.
     """
-    spec = mujoco.MjSpec()
+    spec = new_stage(meshes)
     spec.modelname = model.description.name
-    spec.compiler.degree = False
-    mounts = Mounts(model, _add_bodies(spec, model))
+    bodies = _add_bodies(spec, model)
     tool = model.pinocchio.frames[model.frame_id("tool")]
     at = geometry.pose(tool.placement.translation, tool.placement.rotation)
-    mounts.bodies[tool.parentJoint].add_site(name="tool", group=4, **at)
-    contact = _add_contact_shapes(model, mounts)
+    bodies[tool.parentJoint].add_site(name="tool", group=4, **at)
+    _add_contact_shapes(model, bodies)
     gripper = model.description.end_effector.gripper
-    jaw = None
-    if gripper is not None:
-        jaw = _add_hand(spec, model, gripper, mounts, grips)
-        contact += FINGERS
+    jaw = _add_hand(spec, model, gripper, bodies, grips) if gripper else None
     _add_pairs(spec, model)
     _add_servos(spec, model)
     if meshes:
-        _add_meshes(spec, model, mounts, jaw)
-        for index, shape in enumerate(model.description.visual):
-            ghost = _ghost(geometry.VISIBLE_GROUP)
-            _add_shape(mounts, shape, name=f"visual_{index}", rgba=shape.rgba, **ghost)
-    return SimulatedRobot(spec, contact, _grasp_geoms(model, contact), _finger_joints(gripper, grips))
+        _add_meshes(spec, model, bodies, jaw)
+    return spec
+
+
+def grasp_geoms(model: RobotModel) -> tuple[str, ...]:
+    """Return the names of the geoms that may touch movable things: palm and fingers."""
+    gripper = model.description.end_effector.gripper
+    if gripper is None:
+        return ()
+    return (*(shape.name for shape in _solid(model) if shape.frame == gripper.frame), *FINGERS)
 
 
 def _add_hand(
-    spec: MjSpec, model: RobotModel, gripper: Gripper, mounts: Mounts, grips: bool
+    spec: MjSpec, model: RobotModel, gripper: Gripper, bodies: list[MjsBody], grips: bool
 ) -> tuple[str, MjsBody, pin.SE3] | None:
     """Add the gripper; return the URDF's link that turns, its body, and its zero on the hand's body."""
-    body, frame = mounts.place(gripper.frame, gripper.placement)
+    joint, frame = _place(model, gripper.frame, gripper.placement)
     if gripper.jaw is None:
-        add_gripper(spec, gripper, body, frame, None, grips)
+        add_gripper(spec, gripper, bodies[joint], frame, None, grips)
         return None
-    carrier, zero = mounts.place(gripper.jaw.frame, Placement(np.zeros(3), np.eye(3)))
-    if carrier is not body:
+    carrier, zero = _place(model, gripper.jaw.frame, _AT_FRAME)
+    if carrier != joint:
         raise HandrailError(
             f"jaw of robot {model.description.name}: expected a frame on the link of {gripper.frame!r}, "
             f"got {gripper.jaw.frame!r}"
         )
-    return gripper.jaw.frame, add_gripper(spec, gripper, body, frame, zero, grips), zero
+    return gripper.jaw.frame, add_gripper(spec, gripper, bodies[joint], frame, zero, grips), zero
 
 
-def _finger_joints(gripper: Gripper | None, grips: bool) -> tuple[str, ...]:
-    if gripper is None or not grips:
-        return ()
-    return FINGERS if gripper.jaw is None else (JAW,)
-
-
-def _ghost(group: int) -> dict[str, int]:
-    return {"contype": 0, "conaffinity": 0, "group": group}
+def _place(model: RobotModel, frame: str, placement: Placement) -> tuple[int, pin.SE3]:
+    """Return the joint whose body carries something placed on a frame, and where that is on the body."""
+    mount = model.pinocchio.frames[model.frame_id(frame)]
+    on_frame = pin.SE3(np.array(placement.rotation), np.array(placement.translation))
+    return mount.parentJoint, mount.placement * on_frame
 
 
 def _add_bodies(spec: MjSpec, model: RobotModel) -> list[MjsBody]:
     """Add one body for the base and one for each arm joint; return them by pinocchio's joint index."""
-    description, pinocchio = model.description, model.pinocchio
+    pinocchio, on_base = model.pinocchio, len(model.description.base.joints)
     base = spec.worldbody.add_body(name=BASE_BODY)
     bodies = [base]
-    on_base = len(description.base.joints)
     for index in range(1, pinocchio.njoints):
         body = base
         if index > on_base:
-            placement = pinocchio.jointPlacements[index]
+            at = pinocchio.jointPlacements[index]
             body = bodies[pinocchio.parents[index]].add_body(
                 name=f"{pinocchio.names[index]}_body",
                 gravcomp=1.0,
-                **geometry.pose(placement.translation, placement.rotation),
+                **geometry.pose(at.translation, at.rotation),
             )
             _set_inertia(body, pinocchio.inertias[index])
         _add_joint(body, model, index)
@@ -141,8 +107,8 @@ def _add_joint(body: MjsBody, model: RobotModel, index: int) -> None:
     `_DRIVE_TIME`: MuJoCo solves contacts before it integrates the servo implicitly, and a faster loop would
     throw what the gripper holds.
     """
-    joint = model.pinocchio.joints[index]
-    name = model.pinocchio.names[index]
+    pinocchio, joint = model.pinocchio, model.pinocchio.joints[index]
+    name = pinocchio.names[index]
     if joint.nq != 1 or joint.nv != 1:
         raise HandrailError(
             f"joint {name!r} of robot {model.description.name}: expected a hinge or a slide with limits, "
@@ -152,55 +118,58 @@ def _add_joint(body: MjsBody, model: RobotModel, index: int) -> None:
     joint.calc(data, np.zeros(1))
     axis = np.asarray(data.S).reshape(6)
     hinge = bool(np.any(axis[3:]))
+    ends, armature = [0.0, 0.0], 0.0
     limited = name not in model.description.base.joints
+    if limited:
+        ends = [
+            float(limit[joint.idx_q])
+            for limit in (pinocchio.lowerPositionLimit, pinocchio.upperPositionLimit)
+        ]
+        armature = _DRIVE_TIME * model.description.limits.servo[joint.idx_v]
     body.add_joint(
         name=name,
         type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
         axis=axis[3:] if hinge else axis[:3],
         limited=limited,
-        armature=_DRIVE_TIME * model.description.limits.servo[joint.idx_v] if limited else 0.0,
-        range=[
-            float(model.pinocchio.lowerPositionLimit[joint.idx_q]) if limited else 0.0,
-            float(model.pinocchio.upperPositionLimit[joint.idx_q]) if limited else 0.0,
-        ],
+        armature=armature,
+        range=ends,
     )
 
 
 def _base_inertia(model: RobotModel) -> pin.Inertia:
     """Return the chassis as a solid box, and what the URDF fixes to it."""
-    description = model.description
-    size = (*description.base.size, description.base.height)
-    chassis = pin.Inertia.FromBox(max(description.base.mass, 1e-3), *size)
-    centre = pin.SE3(np.eye(3), np.array([0.0, 0.0, description.base.height / 2]))
-    fixed = model.pinocchio.inertias[len(description.base.joints)]
-    return centre.act(chassis) + fixed
+    base = model.description.base
+    chassis = pin.Inertia.FromBox(max(base.mass, 1e-3), *base.size, base.height)
+    centre = pin.SE3(np.eye(3), np.array([0.0, 0.0, base.height / 2]))
+    return centre.act(chassis) + model.pinocchio.inertias[len(base.joints)]
 
 
 def _set_inertia(body: MjsBody, inertia: pin.Inertia) -> None:
     moments, axes = np.linalg.eigh(inertia.inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     body.explicitinertial = True
-    body.mass = max(float(inertia.mass), 1e-3)
-    body.ipos = inertia.lever
-    body.inertia = np.maximum(moments, 1e-6)
-    body.iquat = quaternion_from_matrix(axes)
+    body.mass, body.ipos = max(float(inertia.mass), 1e-3), inertia.lever
+    body.inertia, body.iquat = np.maximum(moments, 1e-6), quaternion_from_matrix(axes)
 
 
-def _add_shape(mounts: Mounts, placed: PlacedShape, **arguments: object) -> None:
-    body, at = mounts.place(placed.frame, placed.placement)
-    body.add_geom(
-        **geometry.geom_shape(placed.shape), **geometry.pose(at.translation, at.rotation), **arguments
-    )
-
-
-def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:
-    """Add the description's collision shapes; real fingers stand in for the shape around them."""
+def _solid(model: RobotModel) -> list[PlacedShape]:
+    """Return the description's collision shapes; real fingers stand in for the shape around them."""
     gripper = model.description.end_effector.gripper
-    solid = [shape for shape in model.description.collision if not (gripper and shape.name == gripper.shape)]
-    for shape in solid:
+    return [shape for shape in model.description.collision if not (gripper and shape.name == gripper.shape)]
+
+
+def _add_shape(model: RobotModel, bodies: list[MjsBody], placed: PlacedShape, **options: object) -> None:
+    joint, at = model.mount(placed)
+    pose = geometry.pose(at.translation, at.rotation)
+    bodies[joint].add_geom(**geometry.geom_shape(placed.shape), **pose, **options)
+
+
+def _add_contact_shapes(model: RobotModel, bodies: list[MjsBody]) -> None:
+    for shape in _solid(model):
         floor = geometry.FLOOR_BIT if shape.name in floor_shapes(model) else 0
         _add_shape(
-            mounts,
+            model,
+            bodies,
             shape,
             name=shape.name,
             contype=geometry.ROBOT_BIT,
@@ -208,15 +177,13 @@ def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:
             group=geometry.HIDDEN_GROUP,
             rgba=(0.9, 0.3, 0.2, 0.4),
         )
-    return tuple(shape.name for shape in solid)
 
 
 def _add_pairs(spec: MjSpec, model: RobotModel) -> None:
     """Let the robot touch itself only where the description says that it can."""
-    description = model.description
-    enclosing = description.end_effector.gripper.shape if description.end_effector.gripper else ""
-    for pair in description.self_pairs:
-        firsts, seconds = (FINGERS if name == enclosing else (name,) for name in pair)
+    gripper = model.description.end_effector.gripper
+    for pair in model.description.self_pairs:
+        firsts, seconds = (FINGERS if gripper and name == gripper.shape else (name,) for name in pair)
         for first in firsts:
             for second in seconds:
                 spec.add_pair(name=f"{first}:{second}", geomname1=first, geomname2=second)
@@ -233,12 +200,14 @@ def _add_servos(spec: MjSpec, model: RobotModel) -> None:
 
 
 def _add_meshes(
-    spec: MjSpec, model: RobotModel, mounts: Mounts, jaw: tuple[str, MjsBody, pin.SE3] | None
+    spec: MjSpec, model: RobotModel, bodies: list[MjsBody], jaw: tuple[str, MjsBody, pin.SE3] | None
 ) -> None:
+    """Draw the arm's links by their meshes, and the shapes that the description adds to look at."""
+    ghost = {**geometry.UNTOUCHED, "group": geometry.VISIBLE_GROUP}
     for mesh in placed_meshes(model):
-        body, placement = mounts.bodies[mesh.joint], mesh.placement
+        body, at = bodies[mesh.joint], mesh.placement
         if jaw is not None and mesh.link == jaw[0]:
-            body, placement = jaw[1], jaw[2].actInv(placement)
+            body, at = jaw[1], jaw[2].actInv(at)
         for index, piece in enumerate(mesh.pieces):
             name = f"{mesh.name}_{index}"
             spec.add_mesh(
@@ -252,14 +221,8 @@ def _add_meshes(
                 type=mujoco.mjtGeom.mjGEOM_MESH,
                 meshname=name,
                 rgba=piece.rgba,
-                **_ghost(geometry.VISIBLE_GROUP),
-                **geometry.pose(placement.translation, placement.rotation),
+                **ghost,
+                **geometry.pose(at.translation, at.rotation),
             )
-
-
-def _grasp_geoms(model: RobotModel, contact: tuple[str, ...]) -> tuple[str, ...]:
-    gripper = model.description.end_effector.gripper
-    if gripper is None:
-        return ()
-    palms = [s.name for s in model.description.collision if s.frame == gripper.frame and s.name in contact]
-    return (*palms, *FINGERS)
+    for index, shape in enumerate(model.description.visual):
+        _add_shape(model, bodies, shape, name=f"visual_{index}", rgba=shape.rgba, **ghost)

@@ -1,7 +1,7 @@
 """One scene, two uses: MuJoCo bodies for the simulation, obstacles for the controller."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -16,23 +16,27 @@ _GREY: Colour = (0.6, 0.6, 0.6, 1.0)
 
 
 @dataclass(frozen=True)
-class Patrol:
-    """From a point to another at a constant speed, back, and again: a function of time alone.
-
-    Attributes:
-        start: where it is at time 0 [m], (3,).
-        end: where it turns [m], (3,).
-        speed: [m/s].
-    """
-
-    start: FloatArray
-    end: FloatArray
-    speed: float
+class FrozenArrays:
+    """A value whose arrays are copied and made read-only."""
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        for name in ("start", "end"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+        """Copy them."""
+        for entry in fields(self):
+            if entry.type == FloatArray:
+                object.__setattr__(self, entry.name, frozen(getattr(self, entry.name)))
+
+
+@dataclass(frozen=True)
+class Patrol(FrozenArrays):
+    """From a point to another at a constant speed, back, and again: a function of time alone."""
+
+    start: FloatArray  # where it is at time 0 [m], (3,)
+    end: FloatArray  # where it turns [m], (3,)
+    speed: float  # [m/s]
+
+    def __post_init__(self) -> None:
+        """Check that it moves."""
+        super().__post_init__()
         if not self.length > 0 or not 0 < self.speed < np.inf:
             raise HandrailError(
                 "patrol: expected two points and a positive speed [m/s], "
@@ -57,7 +61,7 @@ class Patrol:
 
 
 @dataclass(frozen=True)
-class Part:
+class Part(FrozenArrays):
     """A piece of an object: a shape at a place in the object's frame; `rgba` None takes the object's."""
 
     shape: Shape
@@ -65,69 +69,42 @@ class Part:
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
     rgba: Colour | None = None
 
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        for name in ("position", "rotation"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+@dataclass(frozen=True)
+class Slide(FrozenArrays):
+    """A rail with stops at both ends, of a thing that slides: a drawer."""
+
+    axis: FloatArray  # direction in which it opens, in the object's frame, a unit vector, (3,)
+    travel: float  # from closed to open [m]
+    damping: float = 8.0  # force per speed [N s/m]
+    friction: float = 3.0  # force that it takes to move it [N]
 
 
 @dataclass(frozen=True)
-class Slide:
-    """A rail with stops at both ends, of a thing that slides: a drawer.
-
-    Attributes:
-        axis: direction in which it opens, in the object's frame, a unit vector, (3,).
-        travel: from closed to open [m].
-        damping: force per speed [N s/m].
-        friction: force that it takes to move it [N].
-    """
-
-    axis: FloatArray
-    travel: float
-    damping: float = 8.0
-    friction: float = 3.0
-
-    def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "axis", frozen(self.axis))
-
-
-@dataclass(frozen=True)
-class SceneObject:
-    """A thing in the scene.
-
-    Attributes:
-        name: unique in the scene.
-        shape: what the controller avoids; encloses the parts.
-        position: of its centre in the world [m], (3,).
-        rotation: world from object, (3, 3).
-        rgba: its colour.
-        mass: of a thing that can be moved [kg]; 0 stands still.
-        work_surface: whether the tool may come close to it.
-        ghost: drawn, never touched: a marker.
-        parts: what is drawn and touched, if not the shape itself.
-        friction: sliding friction coefficient.
-        patrol: how it moves by itself, from `position` on; nothing stops it.
-        slide: the rail that it moves on, for a movable thing that is not loose.
-    """
+class SceneObject(FrozenArrays):
+    """A thing in the scene, by a name that is unique there."""
 
     name: str
     shape: Shape
+    """What the controller avoids; encloses the parts."""
     position: FloatArray
+    """Of its centre in the world [m], (3,)."""
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+    """World from object, (3, 3)."""
     rgba: Colour = _GREY
     mass: float = 0.0
+    """Of a thing that can be moved [kg]; 0 stands still."""
     work_surface: bool = False
+    """Whether the tool may come close to it."""
     ghost: bool = False
+    """Drawn, never touched: a marker."""
     parts: tuple[Part, ...] = ()
+    """What is drawn and touched, if not the shape itself."""
     friction: float = 0.8
     patrol: Patrol | None = None
+    """How it moves by itself, from `position` on; nothing stops it."""
     slide: Slide | None = None
-
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        for name in ("position", "rotation"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+    """The rail that it moves on, for a movable thing that is not loose."""
 
     @property
     def movable(self) -> bool:
@@ -135,9 +112,19 @@ class SceneObject:
         return self.mass > 0
 
     @property
+    def portable(self) -> bool:
+        """Whether the hand can carry it away."""
+        return self.movable and self.slide is None
+
+    @property
     def top(self) -> float:
         """Height of its upper face above the floor [m], for an upright object."""
         return float(self.position[2] + geometry.bounding_box(self.shape)[2] / 2)
+
+    @property
+    def top_centre(self) -> FloatArray:
+        """The centre of its upper face, (3,) [m], for an upright object."""
+        return np.array([*self.position[:2], self.top])
 
     @property
     def front(self) -> float:
@@ -145,9 +132,9 @@ class SceneObject:
         return float(self.position[0] - self.shape.size[0] / 2)
 
     @property
-    def portable(self) -> bool:
-        """Whether the hand can carry it away."""
-        return self.movable and self.slide is None
+    def solids(self) -> tuple[Part, ...]:
+        """What is drawn and touched."""
+        return self.parts or (Part(self.shape, np.zeros(3)),)
 
     def carried(self, tool: Pose, now: Pose) -> Obstacle:
         """Return it as the controller sees it while the hand holds it: the box around it, fixed to the tool.
@@ -160,11 +147,6 @@ class SceneObject:
         inverse = tool.rotation.T
         position = inverse @ (now.position + now.rotation @ centre - tool.position)
         return Obstacle(self.name, box(size), position, inverse @ now.rotation, frame="tool")
-
-    @property
-    def solids(self) -> tuple[Part, ...]:
-        """What is drawn and touched."""
-        return self.parts or (Part(self.shape, np.zeros(3)),)
 
     def obstacle(self, time: float = 0.0) -> Obstacle:
         """Return it as the controller sees it at a time of the episode [s]."""

@@ -1,8 +1,6 @@
 """One episode's physics: a robot in a scene, driven by velocities."""
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from copy import copy
 from functools import lru_cache
 from typing import Any
@@ -10,24 +8,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.world.contacts import ContactMonitor, GraspMonitor
-from handrail.collect.world.gl import mujoco
+from handrail.collect.world.contacts import Contacts
+from handrail.collect.world.gl import MjSpec, mujoco
+from handrail.collect.world.gripper import FINGERS
 from handrail.collect.world.plant import Gate
-from handrail.collect.world.robot import BASE_BODY, FINGERS, SimulatedRobot, build_robot
+from handrail.collect.world.robot import BASE_BODY, build_robot, grasp_geoms
 from handrail.collect.world.scene import Scene
-from handrail.collect.world.stage import add_scene, set_stage
+from handrail.collect.world.stage import add_scene
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _TIMESTEP = 0.002  # [s]
+_UNSTABLE = ("mjWARN_BADQACC", "mjWARN_BADQVEL", "mjWARN_BADQPOS")
 
 
 class Simulation:
-    """A fresh MuJoCo model and data; nothing of an earlier episode can remain in it. A robot and a world.
+    """A plant: a fresh MuJoCo model and data; nothing of an earlier episode can remain in it.
 
     Args:
         model: of the robot.
@@ -59,45 +59,40 @@ class Simulation:
     ) -> None:
         if grip is not None and not grips:
             raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
-        self._model = model
+        self._model, self._scene, self._step = model, scene, step
         self._gripper = model.description.end_effector.gripper if grips else None
-        self._scene = scene
-        self._step = step
+        self._gate = gate or Gate(model, step, float(grip is not None))
         substeps = math.ceil(step / timestep - 1e-9)
         self._shares = np.arange(1, substeps + 1) / substeps
-        with _understood(model):
-            robot = _robot(model, meshes, grips, step / substeps)
-            spec = robot.spec.copy()
+        try:
+            spec = _robot(model, meshes, grips, step / substeps).copy()
             add_scene(spec, scene)
             self.mujoco_model = spec.compile()
+        except ValueError as error:  # such as two of one name
+            where = f"robot {model.description.name} in its scene"
+            raise HandrailError(f"{where}: MuJoCo says: {message_of(error)}") from error
         self.data = mujoco.MjData(self.mujoco_model)
-        self._contacts = ContactMonitor(
-            self.mujoco_model, robot.contact_geoms, robot.grasp_geoms, [m.name for m in scene.movables]
-        )
-        fingers = FINGERS if self._gripper else ()
-        portable = [item.name for item in scene.movables if item.portable]
-        self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
-        self._index(robot.finger_joints)
-        self._gate = gate or Gate(model, step, float(grip is not None))
+        self._contacts = Contacts(self.mujoco_model, scene, grasp_geoms(model), self._gripper is not None)
+        self._index()
         self._place(q, grip)
 
-    def _index(self, fingers: tuple[str, ...]) -> None:
+    def _index(self) -> None:
         """Find where the robot is in MuJoCo's arrays."""
         compiled, names = self.mujoco_model, self._model.joints
         self._q_index = _span([compiled.joint(name).qposadr[0] for name in names])
         self._v_index = _span([compiled.joint(name).dofadr[0] for name in names])
         self._servo_index = np.array([compiled.actuator(name).id for name in names])
         self._tool = compiled.site("tool").id
-        gripper = self._gripper
-        self._travel = gripper.travel if gripper else 0.0
-        self._speed = gripper.pace if gripper else 0.0
-        self._beyond = gripper.beyond if gripper else 0.0
-        self._gripper_servo = -1
-        if gripper:
+        self._gripper_servo, self._travel, self._beyond, reach = -1, 0.0, 0.0, 0.0
+        if self._gripper:
+            fingers = FINGERS if self._gripper.jaw is None else FINGERS[:1]
             self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in fingers])
             self._gripper_servo = compiled.actuator("gripper").id
-        bodies = {item.name: int(compiled.body(item.name).mocapid[0]) for item in self._scene.movers}
-        self._patrols = [(bodies[item.name], item.patrol) for item in self._scene.movers if item.patrol]
+            self._travel, self._beyond = self._gripper.travel, self._gripper.beyond
+            reach = self._gripper.pace * self._step
+        self._reach = reach  # of the fingers in a step
+        movers = [(int(compiled.body(item.name).mocapid[0]), item.patrol) for item in self._scene.movers]
+        self._patrols = [(body, patrol) for body, patrol in movers if patrol]
 
     def _place(self, q: FloatArray, grip: float | None) -> None:
         """Put the robot at q, the gripper open, or closed around something of width `grip` [m]."""
@@ -112,6 +107,10 @@ class Simulation:
         """Put the robot at q, (n,), at rest, for a picture; no time passes."""
         self.data.qpos[self._q_index] = q
         self.data.qvel[:] = 0.0
+        self._see()
+
+    def _see(self) -> None:
+        """Let bodies, cameras and lights be where the joints are."""
         mujoco.mj_kinematics(self.mujoco_model, self.data)
         mujoco.mj_camlight(self.mujoco_model, self.data)
 
@@ -125,15 +124,16 @@ class Simulation:
         contacts.clear()
         model, data, control = self.mujoco_model, self.data, self.data.ctrl
         sent = self._gate.limit(command, data.qpos[self._q_index])
-        for control[:] in self._ramp(before, float(sent[-1])):
+        fingers = self._gripper_servo, self._gripper_target(float(sent[-1])), self._reach
+        after, shares = self._gate.velocity, self._shares
+        for control[:] in _ramp(data.ctrl, before, after, shares, self._servo_index, fingers):
             if patrols:
                 self._move_obstacles()
             mujoco.mj_step(model, data)
             if data.ncon:
                 contacts.look(data)
         self._move_obstacles()
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_camlight(model, data)
+        self._see()
         return sent
 
     def stop(self) -> None:
@@ -170,11 +170,6 @@ class Simulation:
         data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
         data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
-    def _ramp(self, before: FloatArray, gripper: float) -> FloatArray:
-        """Return what the servos are sent at every substep: linear to the command, (substeps, servos)."""
-        fingers = self._gripper_servo, self._gripper_target(gripper), self._speed * self._step
-        return _ramp(self.data.ctrl, before, self._gate.velocity, self._shares, self._servo_index, fingers)
-
     def _gripper_target(self, gripper: float) -> float:
         """Return the opening that the gripper's servo is sent to [m, rad]; closed is a little beyond it."""
         return (1.0 - gripper) * self._travel - self._beyond * gripper
@@ -197,8 +192,7 @@ class Simulation:
     @property
     def tool(self) -> Pose:
         """The pose of the tool point."""
-        rotation = self.data.site_xmat[self._tool].reshape(3, 3).copy()
-        return Pose(self.data.site_xpos[self._tool].copy(), rotation)
+        return _pose(self.data.site_xpos[self._tool], self.data.site_xmat[self._tool])
 
     @property
     def opening(self) -> float:
@@ -210,13 +204,8 @@ class Simulation:
     @property
     def is_stable(self) -> bool:
         """Whether MuJoCo never had to give up on a step."""
-        warnings = self.data.warning
-        bad = (
-            mujoco.mjtWarning.mjWARN_BADQACC,
-            mujoco.mjtWarning.mjWARN_BADQVEL,
-            mujoco.mjtWarning.mjWARN_BADQPOS,
-        )
-        return all(warnings[int(kind)].number == 0 for kind in bad)
+        kinds = (int(getattr(mujoco.mjtWarning, name)) for name in _UNSTABLE)
+        return all(self.data.warning[kind].number == 0 for kind in kinds)
 
     def poses(self) -> dict[str, Pose]:
         """Return where every scene object is now, by name."""
@@ -234,18 +223,25 @@ class Simulation:
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""
-        tool = self.tool
-        names = self._grasp.held(self.data)
+        tool, names = self.tool, self._contacts.held(self.data)
         return tuple(self._scene.find(name).carried(tool, self._pose(name)) for name in names)
 
     def _pose(self, name: str) -> Pose:
         body = self.data.body(name)
-        return Pose(body.xpos.copy(), body.xmat.reshape(3, 3).copy())
+        return _pose(body.xpos, body.xmat)
+
+
+def _pose(position: FloatArray, rotation: FloatArray) -> Pose:
+    """Return a copy of where something is in MuJoCo's arrays, (3,) and (9,)."""
+    return Pose(position.copy(), rotation.reshape(3, 3).copy())
 
 
 @exact_jit
 def _ramp(control, before, after, shares, servos, fingers):
-    """Return controls on the way from one velocity to another, and the fingers' towards their opening."""
+    """Return what servos are sent at every substep, (substeps, servos).
+
+    That is on the way from one velocity to another; the fingers' servo goes towards their opening.
+    """
     ramp = np.empty((len(shares), len(control)))
     finger, opening, reach = fingers
     for k in range(len(shares)):
@@ -264,19 +260,9 @@ def _span(places: list[int]) -> slice | IntArray:
     return slice(int(index[0]), int(index[-1]) + 1) if together else index
 
 
-@contextmanager
-def _understood(model: RobotModel) -> Iterator[None]:
-    """Say in one line what MuJoCo says of a robot or its scene that it does not take, as two of one name."""
-    try:
-        yield
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        raise HandrailError(f"robot {model.description.name} in its scene: MuJoCo says: {said}") from error
-
-
 @lru_cache(maxsize=8)
-def _robot(model: RobotModel, meshes: bool, grips: bool, timestep: float) -> SimulatedRobot:
-    robot = build_robot(model, meshes, grips)
-    robot.spec.compiler.usethread = meshes  # without any, waking a second thread takes longer than its work
-    set_stage(robot.spec, timestep, meshes)
-    return robot
+def _robot(model: RobotModel, meshes: bool, grips: bool, timestep: float) -> MjSpec:
+    spec = build_robot(model, meshes, grips)
+    spec.compiler.usethread = meshes  # without any, waking a second thread takes longer than its work
+    spec.option.timestep = timestep
+    return spec

@@ -1,13 +1,14 @@
-"""What a task is: it samples an episode, names its state, and judges the outcome; where robots start."""
+"""What a task is: it samples an episode, names its state, and judges the outcome; what tasks share."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from handrail.collect.world.scene import Scene, SceneObject
-from handrail.controllers.arrays import FloatArray, frozen
+from handrail.collect.world.scene import FrozenArrays, Scene, SceneObject
+from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -17,49 +18,27 @@ _LAID_OUT = 1.49  # of the tool ahead of the base's centre at home [m]
 
 
 @dataclass(frozen=True)
-class Start:
-    """A sampled beginning.
+class Start(FrozenArrays):
+    """A sampled beginning."""
 
-    Attributes:
-        scene: everything around the robot.
-        q: where the robot starts, (n,).
-        goal: of the tool, if there is one.
-        grip: width of what the gripper already holds [m]; None begins with it open.
-    """
-
-    scene: Scene
-    q: FloatArray
-    goal: Pose | None = None
-    grip: float | None = None
-
-    def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "q", frozen(self.q))
+    scene: Scene  # everything around the robot
+    q: FloatArray  # where the robot starts, (n,)
+    goal: Pose | None = None  # of the tool, if there is one
+    grip: float | None = None  # width of what the gripper already holds [m]; None begins with it open
 
 
 @dataclass(frozen=True)
 class TaskState:
-    """The truth of a moment, for judging an outcome and for scripted operators.
+    """The truth of a moment, for judging an outcome and for scripted operators."""
 
-    Attributes:
-        time: since the episode began [s].
-        tool: pose of the tool point.
-        opening: of the gripper, 0 closed to 1 open.
-        start: how the episode began: scene with the objects' shapes, goal.
-        poses: of every object of the scene, by name.
-        still: names of the movable objects that are at rest.
-        stable: whether the physics went well so far.
-        scale: of the robot's world.
-    """
-
-    time: float
-    tool: Pose
-    opening: float
-    start: Start
-    poses: Mapping[str, Pose]
-    still: frozenset[str] = frozenset()
-    stable: bool = True
-    scale: float = 1.0
+    time: float  # since the episode began [s]
+    tool: Pose  # of the tool point
+    opening: float  # of the gripper, 0 closed to 1 open
+    start: Start  # how the episode began: scene with the objects' shapes, goal
+    poses: Mapping[str, Pose]  # of every object of the scene, by name
+    still: frozenset[str] = frozenset()  # names of the movable objects that are at rest
+    stable: bool = True  # whether the physics went well so far
+    scale: float = 1.0  # of the robot's world
 
     @property
     def goal(self) -> Pose | None:
@@ -102,21 +81,13 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Aim:
-    """A place that the hand is to be brought to now; a person is shown how far that is.
+    """A place that the hand is to be brought to now; a person is shown how far that is."""
 
-    Attributes:
-        name: of what is there.
-        position: of the tool point [m], (3,).
-        rotation: world from tool, (3, 3); None where any will do.
-        distance: tolerance of the task's judge [m]; 0 where it has none.
-        angle: likewise [rad].
-    """
-
-    name: str
-    position: FloatArray
-    rotation: FloatArray | None = None
-    distance: float = 0.0
-    angle: float = 0.0
+    name: str  # of what is there
+    position: FloatArray  # of the tool point [m], (3,)
+    rotation: FloatArray | None = None  # world from tool, (3, 3); None where any will do
+    distance: float = 0.0  # tolerance of the task's judge [m]; 0 where it has none
+    angle: float = 0.0  # likewise [rad]
 
 
 class Task(Protocol):
@@ -161,12 +132,9 @@ class Aimed(Protocol):
 
 @runtime_checkable
 class Staged(Protocol):
-    """A task that is done in stages, one after the other."""
+    """A task that is done in stages, one after the other: their names in order."""
 
-    @property
-    def stages(self) -> tuple[str, ...]:
-        """Their names, in order."""
-        ...
+    stages: tuple[str, ...]
 
     def stage(self, state: TaskState) -> str:
         """Return which of them is to be done at a moment."""
@@ -175,17 +143,11 @@ class Staged(Protocol):
 
 @dataclass(frozen=True)
 class FixedTask:
-    """A task without anything random.
-
-    Attributes:
-        begin: how every episode begins.
-        judge: says how it stands.
-        horizon: time limit [s].
-    """
+    """A task without anything random: how every episode begins, and a judge that says how it stands."""
 
     begin: Start
     judge: Callable[[TaskState], Verdict]
-    horizon: float
+    horizon: float  # time limit [s]
     description: str = ""
     state_names: tuple[str, ...] = ()
 
@@ -214,6 +176,16 @@ def reach_share(model: RobotModel) -> float:
     home = model.description.home
     away = model.pose(home).position[:2] - model.pose(home, "planar_base").position[:2]
     return min(1.0, float(np.linalg.norm(away)) / _LAID_OUT)
+
+
+def hand_rotation(x: ArrayLike, z: ArrayLike) -> FloatArray:
+    """Return the rotation of a hand that points along z and opens along x, unit vectors, (3, 3)."""
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def nearest_rotation(tool: FloatArray, rotations: Iterable[FloatArray]) -> FloatArray:
+    """Return the one of some rotations that is nearest to the tool's, (3, 3)."""
+    return max(rotations, key=lambda rotation: float(np.trace(rotation.T @ tool)))
 
 
 def check_large(model: RobotModel, task: str) -> None:

@@ -68,10 +68,10 @@ class Bench:
     @property
     def arm(self):
         """Where the arm's joints are [rad]."""
-        return self._env.robot.state().q[3:]
+        return self._env.plant.state().q[3:]
 
     def view(self):
-        return View(self._env.robot.state(), self._env.task_state())
+        return View(self._env.plant.state(), self._env.task_state())
 
     def wait(self, come, patience=20.0):
         """Wait until something of the intent is so; return the intent."""

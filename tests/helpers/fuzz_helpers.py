@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from handrail.collect.world.gl import mujoco
+from handrail.collect.world.gripper import FINGERS
 from handrail.collect.world.plant import Gate
-from handrail.collect.world.robot import FINGERS
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.reach import sample_movers

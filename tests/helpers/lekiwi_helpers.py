@@ -133,7 +133,7 @@ def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: floa
     env = HandrailEnv(PickPlace(), "lekiwi", fps=20, observes=False, real=True, plant=plant)
     env.reset(seed=seed)
     mpc = MaskedMpc(model)
-    mpc.reset(env.world.obstacles())
+    mpc.reset(env.plant.obstacles())
     rude = RudeOperator(mpc.channels, model.description.limits, np.random.default_rng([seed, 7]))
     before, begun, way, place = client.body.contacts, client.clock.now, 0.0, env.state().q
     while client.clock.now - begun < seconds:
@@ -141,6 +141,6 @@ def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: floa
         state = env.state()
         way, place = way + float(np.linalg.norm(state.q[:2] - place[:2])), state.q
         command = mpc.update(state, rude.intent(state.time))
-        env.robot.send(np.append(command.velocity(0.05), 0.0))
+        env.plant.send(np.append(command.velocity(0.05), 0.0))
     link.close()
     return client.body.contacts - before, way

@@ -1,7 +1,12 @@
 """Things that tasks put into scenes: tables, an open bin, cubes, a tray, obstacles on the floor."""
 
-import numpy as np
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handrail.collect.world.geometry import bounding_box
+from handrail.collect.world.observation import padded, row_names
 from handrail.collect.world.scene import Colour, Part, Scene, SceneObject, box
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
@@ -9,17 +14,34 @@ from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Shape
 
-_WOOD: Colour = (0.72, 0.56, 0.40, 1.0)
-_CABINET: Colour = (0.87, 0.86, 0.83, 1.0)
-_WALL: Colour = (0.20, 0.42, 0.70, 1.0)
+WOOD: Colour = (0.72, 0.56, 0.40, 1.0)
+CABINET: Colour = (0.87, 0.86, 0.83, 1.0)
+STEEL: Colour = (0.45, 0.47, 0.50, 1.0)
+_RED: Colour = (0.85, 0.16, 0.14, 1.0)
+_BIN: Colour = (0.20, 0.42, 0.70, 1.0)
 _CONE: Colour = (0.90, 0.45, 0.10, 1.0)
-_STEEL: Colour = (0.45, 0.47, 0.50, 1.0)
+_CRATE: Colour = (0.55, 0.58, 0.36, 1.0)
 _TRAY: Colour = (0.30, 0.55, 0.42, 1.0)
 
 TRAY_BAR = 0.03  # width and height of a tray's handle [m]
-MOST_OBSTACLES = 3
+SIDES = (-1.0, 1.0)
+_MOST_OBSTACLES = 3
 _PREFIX = "obstacle"
 _QUANTITIES = ("x", "y", "radius", "height")
+
+
+def block(size: tuple[float, float, float], at: ArrayLike, rgba: Colour | None = None) -> Part:
+    """Return a box with full lengths at a place in an object's frame [m]."""
+    return Part(box(size), np.array(at), rgba=rgba)
+
+
+def standing(
+    name: str, shape: Shape, x: float, y: float, bottom: float = 0.0, yaw: float = 0.0, **options: Any
+) -> SceneObject:
+    """Return an upright thing that stands at a height [m], turned by `yaw` [rad]."""
+    position = np.array([x, y, bottom + bounding_box(shape)[2] / 2])
+    turn = {"rotation": matrix_from_rpy([0.0, 0.0, yaw])} if yaw else {}
+    return SceneObject(name, shape, position, **turn, **options)
 
 
 def table(name: str, x: float, y: float, size: tuple[float, float, float], scale: float = 1.0) -> SceneObject:
@@ -27,28 +49,15 @@ def table(name: str, x: float, y: float, size: tuple[float, float, float], scale
     depth, width, height = size
     slab, inset = 0.04 * scale, 0.03 * scale
     parts = (
-        Part(box([depth, width, slab]), np.array([0.0, 0.0, (height - slab) / 2])),
-        Part(
-            box([depth - 2 * inset, width - 2 * inset, height - slab]),
-            np.array([0.0, 0.0, -slab / 2]),
-            rgba=_CABINET,
-        ),
+        block((depth, width, slab), [0.0, 0.0, (height - slab) / 2]),
+        block((depth - 2 * inset, width - 2 * inset, height - slab), [0.0, 0.0, -slab / 2], CABINET),
     )
-    centre = np.array([x, y, height / 2])
-    return SceneObject(name, box(size), centre, rgba=_WOOD, work_surface=True, parts=parts)
+    return standing(name, box(size), x, y, rgba=WOOD, work_surface=True, parts=parts)
 
 
 def cube(name: str, x: float, y: float, bottom: float, yaw: float, edge: float, mass: float) -> SceneObject:
     """Return a cube that can be grasped, standing at height `bottom` [m], turned by `yaw` [rad]."""
-    return SceneObject(
-        name,
-        box([edge] * 3),
-        np.array([x, y, bottom + edge / 2]),
-        matrix_from_rpy([0.0, 0.0, yaw]),
-        rgba=(0.85, 0.16, 0.14, 1.0),
-        mass=mass,
-        friction=1.0,
-    )
+    return standing(name, box([edge] * 3), x, y, bottom, yaw, rgba=_RED, mass=mass, friction=1.0)
 
 
 def open_bin(
@@ -57,37 +66,18 @@ def open_bin(
     """Return a square bin without a lid, 1 cm · scale thick; to the controller it is one box [m]."""
     wall = 0.01 * scale
     outer = inner + 2 * wall
-    parts = [Part(box([outer, outer, wall]), np.array([0.0, 0.0, (wall - height) / 2]))]
-    for sign in (-1.0, 1.0):
-        offset = sign * (inner + wall) / 2
-        parts.append(Part(box([wall, outer, height - wall]), np.array([offset, 0.0, wall / 2])))
-        parts.append(Part(box([inner, wall, height - wall]), np.array([0.0, offset, wall / 2])))
-    return SceneObject(
-        name,
-        box([outer, outer, height]),
-        np.array([x, y, bottom + height / 2]),
-        rgba=_WALL,
-        work_surface=True,
-        parts=tuple(parts),
-    )
+    parts = [block((outer, outer, wall), [0.0, 0.0, (wall - height) / 2])]
+    for side in SIDES:
+        away = side * (inner + wall) / 2
+        parts.append(block((wall, outer, height - wall), [away, 0.0, wall / 2]))
+        parts.append(block((inner, wall, height - wall), [0.0, away, wall / 2]))
+    looks = {"rgba": _BIN, "work_surface": True, "parts": tuple(parts)}
+    return standing(name, box([outer, outer, height]), x, y, bottom, **looks)
 
 
 def pillar(name: str, x: float, y: float, radius: float, height: float) -> SceneObject:
     """Return a cylinder that stands on the floor [m]."""
-    return SceneObject(
-        name, Shape("cylinder", np.array([radius, height])), np.array([x, y, height / 2]), rgba=_CONE
-    )
-
-
-def crate(name: str, x: float, y: float, yaw: float, size: tuple[float, float, float]) -> SceneObject:
-    """Return a box that stands on the floor; full lengths [m], turned by `yaw` [rad]."""
-    return SceneObject(
-        name,
-        box(size),
-        np.array([x, y, size[2] / 2]),
-        matrix_from_rpy([0.0, 0.0, yaw]),
-        rgba=(0.55, 0.58, 0.36, 1.0),
-    )
+    return standing(name, Shape("cylinder", np.array([radius, height])), x, y, rgba=_CONE)
 
 
 def footprint(item: SceneObject) -> float:
@@ -112,14 +102,13 @@ def tray(
     """
     length, width, height = size
     thick, rim, bar = 0.01, 0.012, TRAY_BAR
-    side, end = (length / 2 - thick / 2, 0.0), (0.0, width / 2 - thick / 2)
-    parts = [Part(box([length, width, thick]), np.array([0.0, 0.0, -thick / 2]))]
-    for sign in (-1.0, 1.0):
-        parts.append(Part(box([thick, width, rim]), np.array([sign * side[0], side[1], rim / 2])))
-        parts.append(Part(box([length - 2 * thick, thick, rim]), np.array([end[0], sign * end[1], rim / 2])))
-        post = np.array([0.0, sign * end[1], (rim + height) / 2])
-        parts.append(Part(box([bar, thick, height - rim]), post, rgba=_STEEL))
-    parts.append(Part(box([bar, width, bar]), np.array([0.0, 0.0, height]), rgba=_STEEL))
+    x, y = length / 2 - thick / 2, width / 2 - thick / 2
+    parts = [block((length, width, thick), [0.0, 0.0, -thick / 2])]
+    for side in SIDES:
+        parts.append(block((thick, width, rim), [side * x, 0.0, rim / 2]))
+        parts.append(block((length - 2 * thick, thick, rim), [0.0, side * y, rim / 2]))
+        parts.append(block((bar, thick, height - rim), [0.0, side * y, (rim + height) / 2], STEEL))
+    parts.append(block((bar, width, bar), [0.0, 0.0, height], STEEL))
     shape = box([length, width, 2 * (height + bar)])
     position = handle - rotation @ np.array([0.0, 0.0, height])
     return SceneObject(
@@ -130,22 +119,18 @@ def tray(
 def can(name: str, position: FloatArray, radius: float, height: float, mass: float) -> SceneObject:
     """Return an upright can centred at a place, (3,) [m]."""
     shape = Shape("cylinder", np.array([radius, height]))
-    return SceneObject(name, shape, position, rgba=(0.85, 0.16, 0.14, 1.0), mass=mass, friction=0.35)
+    return SceneObject(name, shape, position, rgba=_RED, mass=mass, friction=0.35)
 
 
 def obstacle_names() -> tuple[str, ...]:
     """Return the names of what `obstacle_features` returns, (12,)."""
-    return tuple(
-        f"{_PREFIX}_{index}.{quantity}" for index in range(MOST_OBSTACLES) for quantity in _QUANTITIES
-    )
+    return row_names(_PREFIX, _MOST_OBSTACLES, _QUANTITIES)
 
 
 def obstacle_features(scene: Scene) -> FloatArray:
     """Return place, radius and height of the obstacles [m], (12,); absent ones are all zero."""
-    numbers = np.zeros((MOST_OBSTACLES, len(_QUANTITIES)))
-    for row, item in zip(numbers, floor_obstacles(scene), strict=False):
-        row[:] = (*item.position[:2], footprint(item), item.top)
-    return numbers.ravel()
+    rows = [(*item.position[:2], footprint(item), item.top) for item in floor_obstacles(scene)]
+    return padded(rows, _MOST_OBSTACLES, len(_QUANTITIES))
 
 
 def floor_obstacles(scene: Scene) -> tuple[SceneObject, ...]:
@@ -164,20 +149,18 @@ def sample_obstacles(
         rng: drawn from.
         clearance: between the robot's start and an obstacle, and between obstacles, at scale 1 [m].
     """
-    wanted = int(rng.integers(2, MOST_OBSTACLES + 1))
-    start, reach = _start_circle(model, q)
-    scale = model.description.world.scale
+    wanted = int(rng.integers(2, _MOST_OBSTACLES + 1))
+    start, scale = model.pose(q, "planar_base").position[:2], model.description.world.scale
+    circles = [(start, float(np.hypot(*model.description.base.size) / 2))]  # the chassis, then obstacles
     placed: list[SceneObject] = []
     for _ in range(1000):
         if len(placed) == wanted:
             return placed
         item = _sample_obstacle(f"{_PREFIX}_{len(placed)}", scale, rng)
-        circles = [(start, reach), *((other.position[:2], footprint(other)) for other in placed)]
-        if all(
-            np.linalg.norm(item.position[:2] - centre) > radius + footprint(item) + clearance * scale
-            for centre, radius in circles
-        ):
+        at, size = item.position[:2], footprint(item)
+        if all(np.linalg.norm(at - centre) > radius + size + clearance * scale for centre, radius in circles):
             placed.append(item)
+            circles.append((at, size))
     raise HandrailError(
         f"scene: no room for {wanted} obstacles around robot {model.description.name}, "
         f"which starts at {start.round(2).tolist()}, with {clearance} m between them"
@@ -190,10 +173,5 @@ def _sample_obstacle(name: str, scale: float, rng: np.random.Generator) -> Scene
     if rng.random() < 0.6:
         return pillar(name, x, y, scale * rng.uniform(0.10, 0.18), height)
     width, depth = scale * rng.uniform(0.16, 0.26, 2)
-    return crate(name, x, y, rng.uniform(-np.pi / 4, np.pi / 4), (width, depth, height))
-
-
-def _start_circle(model: RobotModel, q: FloatArray) -> tuple[FloatArray, float]:
-    """Return a circle around the chassis where it starts: centre (2,) and radius [m]."""
-    base = model.pose(q, "planar_base").position[:2]
-    return base, float(np.hypot(*model.description.base.size) / 2)
+    yaw = rng.uniform(-np.pi / 4, np.pi / 4)
+    return standing(name, box([width, depth, height]), x, y, yaw=yaw, rgba=_CRATE)

@@ -1,11 +1,21 @@
 """Fetch a cube from one table and put it into a bin on another, past obstacles on the floor."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
+from handrail.collect.world.observation import names_of, pose_names, pose_numbers
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.world.task import Aim, Start, TaskState, Verdict, near_home
+from handrail.collect.world.task import (
+    Aim,
+    Start,
+    TaskState,
+    Verdict,
+    hand_rotation,
+    near_home,
+    nearest_rotation,
+)
 from handrail.collect.world.tasks.furniture import (
     cube,
     obstacle_features,
@@ -15,14 +25,11 @@ from handrail.collect.world.tasks.furniture import (
     table,
 )
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.parts import WorldScale
 
 _MASS = 0.1  # of a cube of 5 cm [kg]
 _BIN_HEIGHT = 0.10
-_POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-_STAGES = ("approach", "grasp", "lift", "carry", "place")
 _AT, _AROUND, _LIFTED = (
     2.0,
     1.0,
@@ -39,58 +46,41 @@ class PickPlace:
 
     Success: the cube at rest inside the bin, the gripper open and away from it.
     Failure: the cube on the floor.
-
-    Attributes:
-        description: what the operator is asked to do.
-        horizon: time limit [s].
-        clearance: between the robot's start and anything on the floor, and between obstacles, at scale 1 [m].
     """
 
     description: str = "Pick up the cube and put it into the bin on the other table."
-    horizon: float = 90.0
+    horizon: float = 90.0  # time limit [s]
     clearance: float = 0.15
+    """Between the robot's start and anything on the floor, and between obstacles, at scale 1 [m]."""
+    stages: ClassVar = ("approach", "grasp", "lift", "carry", "place")
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Cube pose, bin centre, the tables' top centres, obstacles (absent ones are all zero)."""
-        names = [f"cube.{axis}" for axis in _POSE]
-        names += [f"{item}.{axis}" for item in ("bin", "cube_table", "bin_table") for axis in "xyz"]
-        return (*names, *obstacle_names())
+        tables = (*names_of("cube_table"), *names_of("bin_table"))
+        return (*pose_names("cube"), *names_of("bin"), *tables, *obstacle_names())
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw tables, cube, bin, obstacles and the robot's start."""
         side, world = rng.choice([-1.0, 1.0]), model.description.world
-        cube_table = _sample_table("cube_table", side, world, rng)
-        bin_table = _sample_table("bin_table", -side, world, rng)
+        tables = _sample_table("cube_table", side, world, rng), _sample_table("bin_table", -side, world, rng)
         q = near_home(model, rng)
-        objects = (
-            cube_table,
-            bin_table,
-            _sample_cube(cube_table, world, rng),
-            _sample_bin(bin_table, world, rng),
-            *sample_obstacles(model, q, rng, self.clearance),
-        )
+        things = _sample_cube(tables[0], world, rng), _sample_bin(tables[1], world, rng)
+        objects = (*tables, *things, *sample_obstacles(model, q, rng, self.clearance))
         return Start(Scene(objects, _VIEW.scaled(world.scale)), q)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (28,)."""
-        pose = state.pose("cube")
-        numbers = [*pose.position, *quaternion_from_matrix(pose.rotation), *state.pose("bin").position]
-        for name in ("cube_table", "bin_table"):
-            item = state.object(name)
-            numbers += [item.position[0], item.position[1], item.top]
-        return np.concatenate([numbers, obstacle_features(state.start.scene)])
-
-    @property
-    def stages(self) -> tuple[str, ...]:
-        """What is done one after the other."""
-        return _STAGES
+        numbers = [pose_numbers(state.pose("cube")), state.pose("bin").position]
+        numbers += [state.object(name).top_centre for name in ("cube_table", "bin_table")]
+        return np.concatenate([*numbers, obstacle_features(state.start.scene)])
 
     def stage(self, state: TaskState) -> str:
         """Return what is to be done: get to the cube, close around it, lift it, go over the bin, let go."""
         cube, start = state.pose("cube").position, state.object("cube")
         width, away = start.shape.size[0], float(np.linalg.norm(state.tool.position - cube))
-        if _over_bin(state, cube):
+        local, half = _in_bin(state, cube)
+        if np.all(np.abs(local[:2]) < half[:2]) and local[2] > -half[2]:  # in the bin, or anywhere above it
             return "place"
         if cube[2] > start.position[2] + _LIFTED * width:
             return "carry"
@@ -100,28 +90,27 @@ class PickPlace:
 
     def aim(self, state: TaskState) -> Aim:
         """Return the cube, from above; once it is in hand, the place above the bin to let it go."""
-        if self.stage(state) in _STAGES[:2]:
+        if self.stage(state) in self.stages[:2]:
             cube = state.pose("cube")
             return Aim("cube", cube.position, grasp_rotation(state.tool.rotation, cube.rotation))
-        position = np.array(state.pose("bin").position)
-        position[2] = state.object("bin").top + _ABOVE * state.scale
-        return Aim("bin", position)
+        above = state.object("bin").top + _ABOVE * state.scale
+        return Aim("bin", np.array([*state.pose("bin").position[:2], above]))
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge where the cube is, whether it rests, and where the gripper is."""
         position = state.pose("cube").position
         if position[2] < 2 * state.object("cube").shape.size[0]:
             return Verdict(failure="dropped")
-        rests = _inside_bin(state, position) and "cube" in state.still
+        local, half = _in_bin(state, position)
+        rests = bool(np.all(np.abs(local) < half)) and "cube" in state.still
         return Verdict(success=rests and state.let_go(position))
 
 
 def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
     """Return the rotation nearest to the tool's that points it down, fingers square to the cube, (3, 3)."""
-    yaw, down = np.arctan2(cube[1, 0], cube[0, 0]), np.array([0.0, 0.0, -1.0])
-    ahead = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in yaw + np.pi / 2 * np.arange(4)]
-    candidates = [np.column_stack([x, np.cross(down, x), down]) for x in ahead]
-    return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))
+    angles = np.arctan2(cube[1, 0], cube[0, 0]) + np.pi / 2 * np.arange(4)
+    ahead = ([np.cos(angle), np.sin(angle), 0.0] for angle in angles)
+    return nearest_rotation(tool, (hand_rotation(x, [0.0, 0.0, -1.0]) for x in ahead))
 
 
 def _sample_table(name: str, side: float, world: WorldScale, rng: np.random.Generator) -> SceneObject:
@@ -145,14 +134,7 @@ def _sample_bin(on: SceneObject, world: WorldScale, rng: np.random.Generator) ->
     return open_bin("bin", x, y, on.top, inner, scale * _BIN_HEIGHT, scale)
 
 
-def _inside_bin(state: TaskState, position: FloatArray) -> bool:
-    pose, size = state.pose("bin"), state.object("bin").shape.size
-    local = pose.rotation.T @ (position - pose.position)
-    return bool(np.all(np.abs(local) < size / 2))
-
-
-def _over_bin(state: TaskState, position: FloatArray) -> bool:
-    """Return whether a place is within the bin, or anywhere above it."""
-    pose, size = state.pose("bin"), state.object("bin").shape.size
-    local = pose.rotation.T @ (position - pose.position)
-    return bool(np.all(np.abs(local[:2]) < size[:2] / 2) and local[2] > -size[2] / 2)
+def _in_bin(state: TaskState, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a place in the bin's frame, and half the bin's lengths, (3,) each [m]."""
+    pose = state.pose("bin")
+    return pose.rotation.T @ (position - pose.position), state.object("bin").shape.size / 2

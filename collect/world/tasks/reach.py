@@ -1,9 +1,11 @@
 """Reach a pose with the tool: the benchmark of the paper's Table I."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
+from handrail.collect.world.observation import padded, pose_names, pose_numbers, row_names
 from handrail.collect.world.scene import Part, Patrol, Scene, SceneObject, Viewpoint
 from handrail.collect.world.task import Aim, Start, TaskState, Verdict
 from handrail.collect.world.tasks.furniture import footprint
@@ -17,43 +19,23 @@ from handrail.collect.world.tasks.goal_reaching import (
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis, quaternion_from_matrix
+from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis
 from handrail.controllers.robot.inverse_kinematics import body_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Shape
 
 _COLOURS = ((0.85, 0.15, 0.15, 1.0), (0.15, 0.7, 0.2, 1.0), (0.15, 0.3, 0.9, 1.0))
 _ARROW = 0.18  # length of the marker's axes [m]
-_STAGES = ("approach", "turn")
-
-
 _MOST_TRIES = 200
 _REACHED = 1e-3  # error of the hand's pose that is left [m, rad]
 _CLEAR = 0.12  # kept to itself and to the floor there, at scale 1 [m]
-
+_VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
 
 FASTEST = 0.5  # [m/s]
 _SLOWEST = 0.2  # [m/s]
 _APART = 1.2  # of a lane's start from the robot's base [m]
 _QUANTITIES = ("x", "y", "vx", "vy", "radius", "height")
 _COLOUR = (0.80, 0.20, 0.45, 1.0)
-
-
-def mover_names(count: int) -> tuple[str, ...]:
-    """Return the names of what `mover_features` returns, (6 count,)."""
-    return tuple(f"mover_{index}.{quantity}" for index in range(count) for quantity in _QUANTITIES)
-
-
-def mover_features(scene: Scene, time: float, count: int) -> FloatArray:
-    """Return place [m], velocity [m/s], radius and height [m] of the movers at a time [s], (6 count,).
-
-    Zero for those that a scene of one's own does not have.
-    """
-    numbers = np.zeros((count, len(_QUANTITIES)))
-    for row, item in zip(numbers, scene.movers, strict=False):
-        obstacle = item.obstacle(time)
-        row[:] = (*obstacle.position[:2], *obstacle.velocity[:2], footprint(item), item.top)
-    return numbers.ravel()
 
 
 def sample_movers(
@@ -84,9 +66,8 @@ def _sample_mover(name: str, scale: float, rng: np.random.Generator) -> SceneObj
     middle = np.array([*(scale * rng.uniform([-1.2, -0.8], [0.6, 0.8])), height / 2])
     start, end = middle - scale * rng.uniform(1.5, 2.0) * ahead, middle + 3.0 * scale * ahead
     patrol = Patrol(start, end, scale * rng.uniform(_SLOWEST, FASTEST))
-    return SceneObject(
-        name, Shape("cylinder", np.array([radius, height])), start, rgba=_COLOUR, patrol=patrol
-    )
+    shape = Shape("cylinder", np.array([radius, height]))
+    return SceneObject(name, shape, start, rgba=_COLOUR, patrol=patrol)
 
 
 def sample_goal_for(model: RobotModel, rng: np.random.Generator) -> Pose:
@@ -104,7 +85,8 @@ def sample_goal_for(model: RobotModel, rng: np.random.Generator) -> Pose:
     collision = CollisionModel(model)
     for _ in range(_MOST_TRIES):
         goal = Pose(rng.uniform(lower, upper), _rotation(world.pitch, world.roll, rng))
-        if _is_reached(model, collision, goal, _CLEAR * world.scale):
+        q, error = body_configuration(model, description.home, goal)
+        if error < _REACHED and float(np.min(collision.values(q[None]))) >= _CLEAR * world.scale:
             return goal
     raise HandrailError(
         f"task Reach: expected a robot that reaches its goals, got {description.name}, "
@@ -115,15 +97,9 @@ def sample_goal_for(model: RobotModel, rng: np.random.Generator) -> Pose:
 def _rotation(pitch: tuple[float, float], roll: tuple[float, float], rng: np.random.Generator) -> FloatArray:
     """Return a hand with any heading; pitch 0 points ahead, π/2 down; x of roll 0 points down, then back."""
     yaw = rng.uniform(-np.pi, np.pi)
-    ahead = matrix_from_rpy([0.0, rng.uniform(*pitch), yaw]) @ np.array(
-        [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
-    )
+    level = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    ahead = matrix_from_rpy([0.0, rng.uniform(*pitch), yaw]) @ level
     return ahead @ matrix_from_rpy([0.0, 0.0, rng.uniform(*roll)])
-
-
-def _is_reached(model: RobotModel, collision: CollisionModel, goal: Pose, clear: float) -> bool:
-    q, error = body_configuration(model, model.description.home, goal)
-    return error < _REACHED and float(np.min(collision.values(q[None]))) >= clear
 
 
 @dataclass(frozen=True)
@@ -132,22 +108,18 @@ class Reach:
 
     Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`. Lengths are made to the
     measure of the robot's world; goals of an arm that cannot point everywhere are those that it gets to.
-
-    Attributes:
-        description: what the operator is asked to do.
-        horizon: time limit [s].
-        moving_obstacles: how many cylinders cross the robot's way; goals are the same with and without.
     """
 
     description: str = "Move the gripper to the goal frame."
-    horizon: float = 30.0
+    horizon: float = 30.0  # time limit [s]
     moving_obstacles: int = 0
+    """How many cylinders cross the robot's way; goals are the same with and without."""
+    stages: ClassVar = ("approach", "turn")
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """The goal's position and quaternion, and what moves."""
-        goal = tuple(f"goal.{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
-        return (*goal, *mover_names(self.moving_obstacles))
+        return (*pose_names("goal"), *row_names("mover", self.moving_obstacles, _QUANTITIES))
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw a goal, then the moving obstacles."""
@@ -157,56 +129,48 @@ class Reach:
         return Start(scene, model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
-        """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
-        goal = _goal(state)
-        movers = mover_features(state.start.scene, state.time, self.moving_obstacles)
-        return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
+        """Return the goal pose, (7,), and place [m], velocity [m/s] and size [m] of what moves, (6,) each.
+
+        Zero for the movers that a scene of one's own does not have.
+        """
+        rows = (
+            (*now.position[:2], *now.velocity[:2], footprint(item), item.top)
+            for item in state.start.scene.movers
+            for now in (item.obstacle(state.time),)
+        )
+        return np.append(pose_numbers(_goal(state)), padded(rows, self.moving_obstacles, len(_QUANTITIES)))
 
     def aim(self, state: TaskState) -> Aim:
         """Return the goal."""
         goal = _goal(state)
         return Aim("goal", goal.position, goal.rotation, POSITION_TOLERANCE * state.scale, ANGLE_TOLERANCE)
 
-    @property
-    def stages(self) -> tuple[str, ...]:
-        """What is done one after the other."""
-        return _STAGES
-
     def stage(self, state: TaskState) -> str:
         """Return what is to be done: get to the goal, or turn there."""
-        d_p, _ = pose_error(state.tool.position, state.tool.rotation, _goal(state))
-        return "turn" if d_p / state.scale <= POSITION_TOLERANCE else "approach"
+        return "turn" if _errors(state)[0] <= POSITION_TOLERANCE else "approach"
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge by the distance and the orientation error."""
-        d_p, d_r = pose_error(state.tool.position, state.tool.rotation, _goal(state))
-        return Verdict(reached(d_p / state.scale, d_r))
-
-
-_VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
+        return Verdict(reached(*_errors(state)))
 
 
 def _goal(state: TaskState) -> Pose:
     return state.goal if state.goal is not None else state.tool
 
 
+def _errors(state: TaskState) -> tuple[float, float]:
+    """Return d_p as in a world of scale 1 [m], and d_r."""
+    d_p, d_r = pose_error(state.tool.position, state.tool.rotation, _goal(state))
+    return d_p / state.scale, d_r
+
+
 def goal_marker(goal: Pose, scale: float = 1.0) -> SceneObject:
     """Return three coloured axes on a ball, drawn without contact."""
-    axes = tuple(
-        Part(
-            Shape("capsule", scale * np.array([0.011, _ARROW])),
-            scale * np.eye(3)[index] * _ARROW / 2,
-            matrix_to_axis(np.eye(3)[index]),
-            colour,
-        )
-        for index, colour in enumerate(_COLOURS)
+    arrow = Shape("capsule", scale * np.array([0.011, _ARROW]))
+    axes = (
+        Part(arrow, scale * axis * _ARROW / 2, matrix_to_axis(axis), colour)
+        for axis, colour in zip(np.eye(3), _COLOURS, strict=True)
     )
     ball = Part(Shape("sphere", scale * np.array([0.03])), np.zeros(3), rgba=(0.95, 0.85, 0.2, 1.0))
-    return SceneObject(
-        "goal",
-        Shape("sphere", scale * np.array([_ARROW])),
-        goal.position,
-        goal.rotation,
-        ghost=True,
-        parts=(*axes, ball),
-    )
+    around = Shape("sphere", scale * np.array([_ARROW]))
+    return SceneObject("goal", around, goal.position, goal.rotation, ghost=True, parts=(*axes, ball))

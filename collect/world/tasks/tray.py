@@ -4,8 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handrail.collect.world.observation import names_of, pose_names, pose_numbers
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.world.task import Aim, Start, TaskState, Verdict, check_large, reach_share
+from handrail.collect.world.task import (
+    Aim,
+    Start,
+    TaskState,
+    Verdict,
+    check_large,
+    hand_rotation,
+    reach_share,
+)
 from handrail.collect.world.tasks.furniture import (
     TRAY_BAR,
     can,
@@ -18,7 +27,6 @@ from handrail.collect.world.tasks.furniture import (
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
@@ -27,7 +35,6 @@ from handrail.controllers.robot.model import Pose, RobotModel
 _SIZE = (0.26, 0.32, 0.20)  # of the tray: length, width, handle above the plate [m]
 _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
 _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
-_POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _MOST_TRIES = 20  # starts drawn, until the arm can hold the tray there
 _VIEW = Viewpoint(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
 _LEVEL = 20.0  # weight of its tilt
@@ -40,22 +47,17 @@ class Tray:
 
     Success: the tray at rest on the table, the can standing on it, the gripper open and away.
     Failure: the can fell off or over; the tray dropped.
-
-    Attributes:
-        description: what the operator is asked to do.
-        horizon: time limit [s].
-        clearance: between the robot's start and anything on the floor, and between obstacles [m].
     """
 
     description: str = "Carry the tray to the table and put it down without spilling the can."
-    horizon: float = 90.0
+    horizon: float = 90.0  # time limit [s]
     clearance: float = 0.15
+    """Between the robot's start and anything on the floor, and between obstacles [m]."""
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Tray pose, can pose, the table's top centre, obstacles (absent ones are all zero)."""
-        names = [f"{item}.{axis}" for item in ("tray", "can") for axis in _POSE]
-        return (*names, *(f"table.{axis}" for axis in "xyz"), *obstacle_names())
+        return (*pose_names("tray"), *pose_names("can"), *names_of("table"), *obstacle_names())
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles."""
@@ -65,24 +67,22 @@ class Tray:
         goal = table("table", x, y, (0.6, 0.7, rng.uniform(0.55, 0.65)))
         q = _sample_start(model, side, rng)
         tool = model.pose(q)
-        held = tray("tray", tool.position, _level(tool.rotation), _SIZE, _TRAY_MASS)
+        level = tool.rotation @ np.diag(
+            [1.0, -1.0, -1.0]
+        )  # under a hand that points down, the bar along its y
+        held = tray("tray", tool.position, level, _SIZE, _TRAY_MASS)
         objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
         return Start(Scene(objects, _VIEW), q, grip=TRAY_BAR)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (29,)."""
-        numbers: list[float] = []
-        for name in ("tray", "can"):
-            pose = state.pose(name)
-            numbers += [*pose.position, *quaternion_from_matrix(pose.rotation)]
-        goal = state.object("table")
-        numbers += [*goal.position[:2], goal.top]
-        return np.concatenate([numbers, obstacle_features(state.start.scene)])
+        poses = (pose_numbers(state.pose(name)) for name in ("tray", "can"))
+        scene = state.start.scene
+        return np.concatenate([*poses, scene.find("table").top_centre, obstacle_features(scene)])
 
     def aim(self, state: TaskState) -> Aim:
         """Return where the hand is when the tray stands in the middle of the table."""
-        goal = state.object("table")
-        return Aim("table", np.array([*goal.position[:2], goal.top]) + HANDLE)
+        return Aim("table", state.object("table").top_centre + HANDLE)
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge the tray, then the can on it, then whether the tray was left on the table."""
@@ -93,8 +93,7 @@ class Tray:
             return Verdict(failure="can_fell")
         inside = np.abs(held.position[:2] - goal.position[:2]) < goal.shape.size[:2] / 2
         down = held.position[2] < goal.top + 0.02 and "tray" in state.still and inside.all()
-        handle = held.position + held.rotation @ HANDLE
-        return Verdict(success=bool(down) and state.let_go(handle))
+        return Verdict(success=bool(down) and state.let_go(held.position + held.rotation @ HANDLE))
 
 
 def _stands_on(held: Pose, thing: Pose) -> bool:
@@ -108,34 +107,28 @@ def _sample_start(model: RobotModel, side: float, rng: np.random.Generator) -> F
     """Return a start on the far side, the hand pointing down ahead of the base."""
     place = np.zeros(3)
     for _ in range(_MOST_TRIES):
-        q, place, rotation = _draw_start(model, side, rng)
-        q, error = arm_configuration(model, q, Pose(place, rotation))
+        q, hand = _draw_start(model, side, rng)
+        q, error = arm_configuration(model, q, hand)
         if error <= 1e-3:
             return q
+        place = hand.position
     raise HandrailError(
         f"task Tray: expected a robot that reaches places such as {place.round(2).tolist()} from above, "
         f"got {model.description.name}"
     )
 
 
-def _draw_start(
-    model: RobotModel, side: float, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return where the base starts, and position and rotation of the hand."""
-    q = np.array(model.description.home)
+def _draw_start(model: RobotModel, side: float, rng: np.random.Generator) -> tuple[FloatArray, Pose]:
+    """Return where the base starts, and the hand's pose there."""
+    q, ahead = np.array(model.description.home), np.eye(3)[0]
     if model.description.base.joints:
         q[:3] += rng.uniform([-0.10, -0.15, -0.15], [0.10, 0.15, 0.15])
         q[1] -= 0.5 * side
-    ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0]) if model.description.base.joints else np.eye(3)[0]
+        ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0])
     base = model.pose(q, "planar_base").position
     away = rng.uniform(1.05, 1.20) * reach_share(model)
     place = base + away * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
-    return q, place, np.column_stack([ahead, np.cross([0.0, 0.0, -1.0], ahead), [0.0, 0.0, -1.0]])
-
-
-def _level(tool: FloatArray) -> FloatArray:
-    """Return the rotation of a level tray under a hand that points down, the bar along the hand's y."""
-    return tool @ np.diag([1.0, -1.0, -1.0])
+    return q, Pose(place, hand_rotation(ahead, [0.0, 0.0, -1.0]))
 
 
 def _sample_can(on: SceneObject, rng: np.random.Generator) -> SceneObject:

@@ -97,7 +97,7 @@ def run_rollout(
     channels = Channels.of(env.model.description)
     interface = policy.interface or RecordedColumns.of(meta, checkpoint.joined)
     with threads(1), repeatable(seed):
-        operator = PolicyOperator(policy, interface, channels, meta.mode, env.task_description)
+        operator = PolicyOperator(policy, interface, channels, meta.mode, env.task.description)
         late = DelayedOperator(operator, perturbation.delay)
         pushers = (Pusher(perturbation.push),) if perturbation.push else ()
         progress = RolloutProgress()

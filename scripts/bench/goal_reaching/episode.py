@@ -142,14 +142,14 @@ class _Observer:
         if self._baseline.aims:
             self._controller.aim(self._goal)  # pyright: ignore[reportAttributeAccessIssue]
         self._env = env
-        self._states, self._tools = [env.robot.state()], [env.world.tool]
+        self._states, self._tools = [env.plant.state()], [env.plant.tool]
         self._contacts: list[tuple[str, ...]] = []
         self._frames: list[Frame] = []
 
     def see(self, frame: Frame) -> None:
-        self._states.append(self._env.robot.state())
-        self._tools.append(self._env.world.tool)
-        self._contacts.append(self._env.world.contacts)
+        self._states.append(self._env.plant.state())
+        self._tools.append(self._env.plant.tool)
+        self._contacts.append(self._env.plant.contacts)
         self._frames.append(frame)
 
     def _error(self, tool: Pose) -> tuple[float, float]:

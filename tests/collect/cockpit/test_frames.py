@@ -47,7 +47,7 @@ def test_the_first_moment_of_a_second_episode_is_json():
         cockpit = Cockpit(env.model, {"ee": MODES["ee"]}, "ee", server)
         for seed in range(2):
             observation, _ = env.reset(seed=seed)
-            view = View(env.robot.state(), env.task_state(), observation)
+            view = View(env.plant.state(), env.task_state(), observation)
             cockpit.begin(env, seed)
             cockpit.reset(view, np.random.default_rng(seed))
             cockpit.act(view)

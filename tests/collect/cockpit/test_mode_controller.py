@@ -37,7 +37,7 @@ def test_no_change_of_mode_jolts(env):
         v = command.velocity(PERIOD)
         assert np.all(np.abs(v - before) <= limits.acceleration * PERIOD * (1 + 1e-6))
         before, fastest = v, max(fastest, float(np.abs(v).max()))
-        env.robot.send(np.append(v, 0.0))
+        env.plant.send(np.append(v, 0.0))
     assert fastest > 0.1
 
 

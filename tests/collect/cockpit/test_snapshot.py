@@ -43,7 +43,7 @@ def person(env):
 
 
 def view(env):
-    return View(env.robot.state(), env.task_state())
+    return View(env.plant.state(), env.task_state())
 
 
 def asked(env, frames=Frames(), **values):  # noqa: B008

@@ -7,8 +7,9 @@ from collect_helpers import environment, write_small_robot
 
 from handrail.collect.world.geometry import bounding_box
 from handrail.collect.world.gl import mujoco
+from handrail.collect.world.gripper import FINGERS
 from handrail.collect.world.meshes import PlacedMesh, placed_meshes
-from handrail.collect.world.robot import FINGERS, build_robot
+from handrail.collect.world.robot import build_robot
 from handrail.collect.world.scene import Scene, SceneObject, box
 from handrail.collect.world.simulation import Simulation
 from handrail.controllers.errors import HandrailError
@@ -55,14 +56,14 @@ def test_tool_pose_and_jacobian_are_pinocchios(model):
 def test_mass_matrix_is_pinocchios_plus_drives_gripper_and_chassis(model):
     """The arm's links alone: take out what pinocchio does not know."""
     robot = build_robot(model, meshes=False)
-    for body in robot.spec.bodies:
+    for body in robot.bodies:
         if body.name == "gripper" or body.name.startswith("finger"):
             body.mass, body.inertia = 1e-9, [1e-12] * 3
         for joint in body.joints:
             joint.armature = 0.0
     for geom in FINGERS:
-        robot.spec.geom(geom).mass = 0.0
-    compiled = robot.spec.compile()
+        robot.geom(geom).mass = 0.0
+    compiled = robot.compile()
     data = mujoco.MjData(compiled)
     q = model.description.home
     data.qpos[: model.size] = q
