@@ -26,17 +26,14 @@ class DrawerScript(PhasedScript):
         """Begin again at the handle when the drawer did not come along; leave it as long as it is near."""
         if name == "release" and opened(view.task) <= _ENOUGH:
             return from_phase(self.plan(view), "stage")
-        away = np.linalg.norm(view.tool.position - handle(view.task))
-        if name == "release" or (name == "leave" and away < _AWAY):
-            return [self._leave(view)]
-        return None
-
-    def _leave(self, view: View) -> ScriptPhase:
-        """Return the phase that backs off from where the handle is now, the base where it is."""
+        bar = handle(view.task)
+        if name != "release" and not (name == "leave" and np.linalg.norm(view.tool.position - bar) < _AWAY):
+            return None
         into = inward(view.task.object("cabinet").rotation)
-        back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
+        rotation = handle_rotation(view.tool.rotation, into)
         base = view.state.q[:3] if self._model.description.base.joints else np.zeros(3)
-        return ScriptPhase(back, base, name="leave", distance=0.03, angle=3.2, pace=0.5, patience=5.0)
+        options = {"distance": 0.03, "angle": 3.2, "pace": 0.5, "patience": 5.0}
+        return [ScriptPhase.at("leave", bar - _BACK * into, rotation, base, **options)]
 
     def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the handle, how to pull it, and how to let go."""
@@ -45,27 +42,21 @@ class DrawerScript(PhasedScript):
         pull = max(_PULL - opened(view.task), 0.05)
         yaw = float(np.arctan2(into[1], into[0]))
         base = standing_within_reach(self._model, view.state.q, Pose(bar, grasp), yaw)
-
-        def phase(name: str, back: float, **options: float) -> ScriptPhase:
-            stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))
-            return ScriptPhase(Pose(bar - back * into, grasp), stand, name=name, **options)  # type: ignore[arg-type]
-
+        back = base - np.array([pull * into[0], pull * into[1], 0.0])
+        before, pulled, at = bar - _BACK * into, bar - pull * into, ScriptPhase.at
         phases = [
-            phase("stage", _BACK, distance=0.02, angle=0.10),
-            phase("approach", 0.0, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
-            phase("grasp", 0.0, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
-            phase("pull", pull, distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
-            phase("release", pull, distance=1.0, angle=3.2, dwell=0.8),
+            at("stage", before, grasp, base, distance=0.02, angle=0.10),
+            at("approach", bar, grasp, base, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            at("grasp", bar, grasp, base, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            at("pull", pulled, grasp, back, distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
+            at("release", pulled, grasp, back, distance=1.0, angle=3.2, dwell=0.8),
         ]
-        if self._drives:
-            hand, now = phases[0].hand, view.state.q[:3]
-            ready = ScriptPhase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
-            phases = [
-                ready,
-                ScriptPhase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08),
-                *phases,
-            ]
-        return phases
+        if not self._drives:
+            return phases
+        hand, now = phases[0].hand, view.state.q[:3]
+        ready = ScriptPhase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
+        drive = ScriptPhase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08)
+        return [ready, drive, *phases]
 
 
 def before_driving(hand: Pose, base: FloatArray, now: FloatArray) -> Pose:

@@ -11,6 +11,8 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_vector
 from handrail.controllers.robot.model import Pose
 
+_JUST = 1e-9  # of rounding [s]
+
 
 class Wander:
     """Independent processes of unit variance: `x(t + h) = e^{−h/τ} x(t) + √(1 − e^{−2h/τ}) ξ`.
@@ -22,8 +24,7 @@ class Wander:
     """
 
     def __init__(self, shape: tuple[int, ...], correlation: float, rng: np.random.Generator) -> None:
-        self._correlation = correlation
-        self._rng = rng
+        self._correlation, self._rng = correlation, rng
         self._value = rng.standard_normal(shape)
         self._time: float | None = None
 
@@ -55,22 +56,21 @@ class Perception:
 
     def see(self, goal: MotionGoal, tool: Pose, time: float) -> MotionGoal:
         """Return the goal as it comes out of what is seen at a time [s]."""
-        wander = self._share * self._wander.at(time)
+        hand, base = np.split(self._share * self._wander.at(time), [6])
         if not self._share:
             return goal
-        hand = np.concatenate([_off(goal.hand[:3], wander[:3]), _off(goal.hand[3:], wander[3:6])])
-        base = np.concatenate([_off(goal.base[:2], wander[6:8]), _off(goal.base[2:], wander[8:])])
         target = goal.target
         if target is not None:
-            errors = hand_errors(tool, target.hand)
-            away, turn = _off(errors[:3], wander[:3]), _off(errors[3:], wander[3:6])
+            away, turn = np.split(_off(hand_errors(tool, target.hand), hand, 3), 2)
             seen = Pose(tool.position + away, matrix_from_vector(turn) @ tool.rotation)
             target = replace(target, hand=seen, meant=target.hand)
-        return replace(goal, hand=hand, base=base, target=target)
+        return replace(goal, hand=_off(goal.hand, hand, 3), base=_off(goal.base, base, 2), target=target)
 
 
-def _off(vector: FloatArray, share: FloatArray) -> FloatArray:
-    return vector + np.linalg.norm(vector) * share
+def _off(vector: FloatArray, share: FloatArray, lengths: int) -> FloatArray:
+    """Return a way and a turn that are misjudged by shares of their norms; the way has so many numbers."""
+    parts = zip(np.split(vector, [lengths]), np.split(share, [lengths]), strict=True)
+    return np.concatenate([part + np.linalg.norm(part) * off for part, off in parts])
 
 
 class HumanHand:
@@ -91,13 +91,11 @@ class HumanHand:
     def __init__(
         self, settings: HumanSettings, full: FloatArray, fine: FloatArray, rng: np.random.Generator
     ) -> None:
-        self._settings = settings
-        self._full, self._fine = np.asarray(full, dtype=float), np.asarray(fine, dtype=float)
+        self._settings, self._full, self._fine = settings, full, fine
         self._seen: deque[tuple[float, FloatArray]] = deque()
-        self._left = np.zeros(len(self._full))  # where the last movement began
-        self._held = np.zeros(len(self._full))  # where it ends
+        self._left = self._held = np.zeros(len(full))  # where the last movement began, and where it ends
         self._moved = -np.inf
-        self._wander = Wander((2, len(self._full)), settings.correlation, rng)
+        self._wander = Wander((2, len(full)), settings.correlation, rng)
 
     def move(self, wanted: FloatArray, time: float) -> FloatArray:
         """Return what the hand commands at a time [s], given what the operator wants now, (k,)."""
@@ -109,19 +107,18 @@ class HumanHand:
         return np.clip(moved, -self._full, self._full) if settings.noise or settings.drift else moved
 
     def _delayed(self, wanted: FloatArray, time: float) -> FloatArray:
-        self._seen.append((time, np.array(wanted, dtype=float)))
-        while len(self._seen) > 1 and self._seen[1][0] <= time - self._settings.delay + 1e-9:
-            self._seen.popleft()
-        oldest, values = self._seen[0]
-        return values if oldest <= time - self._settings.delay + 1e-9 else np.zeros_like(self._full)
+        seen, latest = self._seen, time - self._settings.delay + _JUST
+        seen.append((time, np.array(wanted, dtype=float)))
+        while len(seen) > 1 and seen[1][0] <= latest:
+            seen.popleft()
+        return seen[0][1] if seen[0][0] <= latest else np.zeros_like(self._held)
 
     def _correct(self, wanted: FloatArray, time: float) -> None:
         """Begin a movement if there is reason to, and it may begin."""
+        refractory, released = self._settings.refractory, not np.any(wanted)
         change = np.max(np.abs(wanted - self._held) / self._fine)
-        released = not np.any(wanted)
-        rested = time - self._moved >= self._settings.refractory - 1e-9
-        begins = released or (change > self._settings.threshold and rested) or not self._settings.refractory
-        if begins and not np.array_equal(wanted, self._held):
+        may = change > self._settings.threshold and time - self._moved >= refractory - _JUST
+        if (released or may or not refractory) and not np.array_equal(wanted, self._held):
             self._left = np.zeros_like(self._held) if released else self._position(time)
             self._held, self._moved = wanted, time
 
@@ -129,9 +126,8 @@ class HumanHand:
         """Return where the hand is on its way, without noise, (k,)."""
         if not np.isfinite(self._moved) or not self._settings.movement:
             return self._held
-        return self._left + minimum_jerk((time - self._moved) / self._settings.movement) * (
-            self._held - self._left
-        )
+        share = minimum_jerk((time - self._moved) / self._settings.movement)
+        return self._left + share * (self._held - self._left)
 
 
 def minimum_jerk(share: float) -> float:

@@ -1,5 +1,6 @@
 """How human an operator is: perception, delay, intermittency, noise, drift, switching; who it is."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -50,8 +51,7 @@ class HumanSettings:
 
     def scaled(self, factor: float) -> "HumanSettings":
         """Return the settings with every weakness but the correlation time multiplied by a factor."""
-        values = {name: getattr(self, name) * factor for name in _weaknesses()}
-        return replace(self, **values | {"correlation": self.correlation})
+        return self._times([factor] * len(_WEAKNESSES), "correlation")
 
     def person(self, rng: np.random.Generator) -> "HumanSettings":
         """Draw a person around these settings: each number times `exp(persons · z)`."""
@@ -62,12 +62,15 @@ class HumanSettings:
         return self._drawn(self.moods, rng)
 
     def _drawn(self, spread: float, rng: np.random.Generator) -> "HumanSettings":
-        names = _weaknesses()
-        factors = np.exp(spread * np.clip(rng.standard_normal(len(names)), -_WIDEST, _WIDEST)).tolist()
-        values = {name: getattr(self, name) * factor for name, factor in zip(names, factors, strict=True)}
-        return replace(self, **values | {"persons": self.persons, "moods": self.moods})
+        draws = np.clip(rng.standard_normal(len(_WEAKNESSES)), -_WIDEST, _WIDEST)
+        return self._times(np.exp(spread * draws).tolist(), "persons", "moods")
+
+    def _times(self, factors: Iterable[float], *kept: str) -> "HumanSettings":
+        """Return the settings with every weakness multiplied, but for those that are kept."""
+        pairs = [
+            (name, factor) for name, factor in zip(_WEAKNESSES, factors, strict=True) if name not in kept
+        ]
+        return replace(self, **{name: getattr(self, name) * factor for name, factor in pairs})
 
 
-def _weaknesses() -> list[str]:
-    """Return the names of what makes an operator human: all but how briskly they steer."""
-    return [entry.name for entry in fields(HumanSettings) if entry.name != "briskness"]
+_WEAKNESSES = [entry.name for entry in fields(HumanSettings) if entry.name != "briskness"]

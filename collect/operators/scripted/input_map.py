@@ -8,12 +8,12 @@ from handrail.collect.operators.modes import Focus, TeleopMode
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.placement import straight_solution
-from handrail.collect.operators.scripted.steering import FOLLOW, Gains, MotionGoal, Target
+from handrail.collect.operators.scripted.steering import FOLLOW, Gains, MotionGoal, Target, hand_errors
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
-from handrail.controllers.numerics.rotation import rotation_vector, turned
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import RobotModel
 
@@ -22,8 +22,6 @@ _BASE_WEIGHT = 0.03
 _POSTURE = 0.02  # weight of the arm's posture at home, so that it does not fold the wrong way
 _LARGE = 2.0  # turn of the hand from which on the expert thinks of where the arm's joints belong [rad]
 _RETURN = 0.5  # how fast it would go back there [1/s]
-
-
 _CLEAR = 0.03  # what the motion shall keep clear [m]
 _EXACTLY = 1e-3  # how well one knows where joints belong [m, rad]
 
@@ -38,12 +36,11 @@ class LargeTurn:
     Args:
         model: of the robot.
         gains: full stick of hand and joints.
-        large: turn of the hand from which on it matters how the arm gets there [rad].
         view: of the scene, at the beginning of an episode.
     """
 
-    def __init__(self, model: RobotModel, gains: Gains, large: float, view: View) -> None:
-        self._model, self._gains, self._large = model, gains, large
+    def __init__(self, model: RobotModel, gains: Gains, view: View) -> None:
+        self._model, self._gains = model, gains
         self._base = len(model.description.base.joints)
         self._collision = CollisionModel(model, view.task.obstacles)
         self._goal = view.state.q.copy()
@@ -51,8 +48,7 @@ class LargeTurn:
 
     def is_ahead(self, target: Target, q: FloatArray) -> bool:
         """Return whether the hand has to turn far to where a goal leads."""
-        turn = target.hand.rotation @ self._model.pose(q).rotation.T
-        return float(np.linalg.norm(rotation_vector(turn))) > self._large
+        return float(np.linalg.norm(hand_errors(self._model.pose(q), target.hand)[3:])) > _LARGE
 
     def arm_velocity(self, target: Target, q: FloatArray, base: FloatArray) -> FloatArray:
         """Return the velocity straight to where the arm's joints belong, (n − b,) [rad/s].
@@ -62,19 +58,19 @@ class LargeTurn:
             q: joint positions, (n,).
             base: of the base, from where the operator thinks the hand reaches the target, (b,).
         """
-        if target.identity != self._thought:
-            start = np.concatenate([base, q[self._base :]])
+        anew, gains = target.identity != self._thought, self._gains
+        start = np.concatenate([base, (q if anew else self._goal)[self._base :]])
+        if anew:
             self._goal = straight_solution(self._model, self._collision, start, target.hand, _CLEAR)
             self._thought = target.identity
         else:
-            before = np.concatenate([base, self._goal[self._base :]])
-            self._goal = arm_configuration(self._model, before, target.hand, _EXACTLY)[0]
-        velocity = self._gains.gain * (self._goal - q)[self._base :]
+            self._goal = arm_configuration(self._model, start, target.hand, _EXACTLY)[0]
+        velocity = gains.gain * (self._goal - q)[self._base :]
         hand = self._model.jacobian(q)[:, self._base :] @ velocity
-        fastest = target.pace * self._gains.full[[0, 3]]  # of the hand, and how fast it may turn
+        fastest = target.pace * gains.full[[0, 3]]  # of the hand, and how fast it may turn
         excess = np.array([np.linalg.norm(hand[:3]), np.linalg.norm(hand[3:])]) / fastest
-        excess_of_joints = np.max(np.abs(velocity)) / self._gains.joint_rate
-        return velocity / max(1.0, float(np.max(excess)), float(excess_of_joints))
+        of_joints = float(np.max(np.abs(velocity)) / gains.joint_rate)
+        return velocity / max(1.0, float(np.max(excess)), of_joints)
 
 
 class InputMap(ABC):
@@ -98,11 +94,10 @@ class InputMap(ABC):
         self._model, self._gains = model, gains
         self._base = len(self.channels.base)
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
-        base, joints = gains.full[6:][: self._base], np.full(model.size, gains.joint_rate)
-        joints[: self._base] = base
-        self.full: FloatArray = np.concatenate([base, gains.full[:6], joints])
-        finely = as_fine(model, joints, gains.full[:6]) * joints
-        self.fine: FloatArray = np.concatenate([base, gains.full[:6], finely])
+        hand, base = gains.full[:6], gains.full[6:][: self._base]
+        joints = np.concatenate([base, np.full(model.size - self._base, gains.joint_rate)])
+        self.full: FloatArray = np.concatenate([base, hand, joints])
+        self.fine: FloatArray = np.concatenate([base, hand, as_fine(model, joints, hand) * joints])
 
     @abstractmethod
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
@@ -134,7 +129,7 @@ class StickMap(InputMap):
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Begin with nothing thought of."""
         if self.mask("hand")[self.channels.joint_slice].any():
-            self._turn = LargeTurn(self._model, self._gains, _LARGE, view)
+            self._turn = LargeTurn(self._model, self._gains, view)
 
     def mask(self, focus: Focus) -> BoolArray:
         """Return the channels that the operator owns, (m,)."""
@@ -152,29 +147,25 @@ class StickMap(InputMap):
 
     def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return what the expert makes of a goal on all joints, (n,), within full stick."""
+        base = turned(goal.base, q[2]) if self._base else np.zeros(0)
         if goal.target is not None and self._turn.is_ahead(goal.target, q):
             arm = self._turn.arm_velocity(goal.target, q, goal.target.base[: self._base])
-            return np.concatenate([self._base_world(goal, q), arm])
-        return self._inner_kinematics(goal, q)
+            return np.concatenate([base, arm])
+        return self._inner_kinematics(goal.hand, base, q)
 
-    def _inner_kinematics(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
+    def _inner_kinematics(self, hand: FloatArray, base: FloatArray, q: FloatArray) -> FloatArray:
         """Return the expert's inner inverse kinematics, (n,): the hand first, the base when it can."""
-        jacobian = self._model.jacobian(q)
-        base = self._base_world(goal, q)
-        weights = np.full(self._model.size, _DAMPING) / self._model.description.limits.velocity
-        home = self._model.description.home - q
+        size, home = self._model.size, self._model.description.home - q
         home[: self._base] = 0.0
-        posture = _POSTURE * np.any(goal.hand) * np.eye(self._model.size)[self._base :]
-        rows = [jacobian, np.diag(weights), posture]
-        targets = [goal.hand, np.zeros(self._model.size), posture @ (_RETURN * home)]
+        weights = np.full(size, _DAMPING) / self._model.description.limits.velocity
+        posture = _POSTURE * np.any(hand) * np.eye(size)[self._base :]
+        rows = [self._model.jacobian(q), np.diag(weights), posture]
+        targets = [hand, np.zeros(size), posture @ (_RETURN * home)]
         if len(base):
-            rows.append(_BASE_WEIGHT * np.eye(len(base), self._model.size))
+            rows.append(_BASE_WEIGHT * np.eye(len(base), size))
             targets.append(_BASE_WEIGHT * base)
         solution: FloatArray = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
         return solution / max(1.0, float(np.max(np.abs(solution) / self.full[self.channels.joint_slice])))
-
-    def _base_world(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
-        return turned(goal.base, q[2]) if self.channels.base else np.zeros(0)
 
 
 class LeaderArmMap(StickMap):
@@ -188,8 +179,7 @@ class LeaderArmMap(StickMap):
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Take hold of the leader, which stands as the arm does."""
         super().reset(view, settings, rng)
-        self._leader = view.state.q[self._base :].copy()
-        self._time = view.state.time
+        self._leader, self._time = view.state.q[self._base :].copy(), view.state.time
 
     def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask, base stick and arm together, and how fast the leader shall be moved."""
@@ -201,9 +191,10 @@ class LeaderArmMap(StickMap):
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
         """Return the base's stick, and the velocity that takes the arm's joints to the leader's."""
-        elapsed, self._time = state.time - self._time, state.time
-        lower, upper = self._limits()
+        limits, elapsed = self._model.description.limits, state.time - self._time
+        lower, upper = limits.position_lower[self._base :], limits.position_upper[self._base :]
         self._leader = np.clip(self._leader + elapsed * moved[self._arm], lower, upper)
+        self._time = state.time
         sent = moved.copy()
         sent[self._arm] += FOLLOW * (self._leader - state.q[self._base :])
         return sent
@@ -213,10 +204,6 @@ class LeaderArmMap(StickMap):
         raw = moved / self.full
         raw[self._arm] = self._leader
         return raw
-
-    def _limits(self) -> tuple[FloatArray, FloatArray]:
-        limits = self._model.description.limits
-        return limits.position_lower[self._base :], limits.position_upper[self._base :]
 
 
 def as_fine(model: RobotModel, joints: FloatArray, hand: FloatArray) -> float:

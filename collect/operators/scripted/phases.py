@@ -1,7 +1,8 @@
 """A script made of phases: go there, with the hand or the base, then the next; routes among tables."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from handrail.collect.operators.scripted.steering import (
     Gains,
     MotionGoal,
     Target,
+    base_errors,
     base_twist,
     hand_twist,
     pose_errors,
@@ -27,23 +29,32 @@ _ROUTE_CLEARANCE = 0.25  # of the chassis behind the floor obstacles, and before
 
 @dataclass(frozen=True)
 class ScriptPhase(Target):
-    """One thing to do: get the hand, or the base, to a target.
+    """One thing to do: get the hand, or the base, to a target."""
 
-    Attributes:
-        name: what it is, for whoever plans anew after it.
-        focus: which of the two ends the phase, and is steered in switching mode.
-        gripper: 0 open, 1 closed.
-        beside: `distance` across the tool's axis, where more is good enough there [m].
-        dwell: time to wait, hands still, before the next phase [s].
-        patience: time after which the operator goes on anyway [s].
-    """
+    name: str = ""  # what it is, for whoever plans anew after it
+    focus: Focus = "hand"  # which of the two ends the phase, and is steered in switching mode
+    gripper: float = 0.0  # 0 open, 1 closed
+    beside: float = 0.0  # `distance` across the tool's axis, where more is good enough there [m]
+    dwell: float = 0.0  # time to wait, hands still, before the next phase [s]
+    patience: float = np.inf  # time after which the operator goes on anyway [s]
 
-    name: str = ""
-    focus: Focus = "hand"
-    gripper: float = 0.0
-    beside: float = 0.0
-    dwell: float = 0.0
-    patience: float = np.inf
+    @classmethod
+    def at(
+        cls, name: str, position: FloatArray, rotation: FloatArray, base: FloatArray, **options: Any
+    ) -> "ScriptPhase":
+        """Return the phase that brings the hand to a place, (3,), with a rotation, (3, 3)."""
+        return cls(Pose(position, rotation), base, name=name, **options)
+
+    def is_reached(self, view: View) -> bool:
+        """Return whether the base, or the hand, is near enough."""
+        if self.focus == "base":
+            *way, turn = base_errors(view.state.q, self.base)
+            return bool(np.hypot(*way) < self.distance and abs(turn) < self.angle)
+        distance, angle = pose_errors(view.tool, self.hand)
+        if self.beside:
+            *across, along = view.tool.rotation.T @ (view.tool.position - self.hand.position)
+            distance = max(abs(along), np.hypot(*across) * self.distance / self.beside)
+        return bool(distance < self.distance and angle < self.angle)
 
 
 class PhasedScript(ABC):
@@ -72,54 +83,38 @@ class PhasedScript(ABC):
         self._begin(self.plan(view), view.state.time)
 
     def _begin(self, phases: list[ScriptPhase], time: float) -> None:
-        self._phases = phases
-        self._enter(0, time)
+        """Begin with the first of the phases that are left."""
+        self._phases, self._entered = phases, time
+        self._reached_at: float | None = None
 
     def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now, and go to the next phase when this one is done."""
         self._advance(view)
-        phase = self._phases[min(self._index, len(self._phases) - 1)]
-        if self._index >= len(self._phases) or self._reached_at is not None:
+        phase = self._phases[0]
+        if self._reached_at is not None:
             return MotionGoal.rest(phase.focus, phase.gripper)
         hand = hand_twist(view.tool, phase.hand, self._gains, phase.pace)
         base = base_twist(view.state.q, phase.base, self._gains)
         return MotionGoal(hand, base, phase.focus, phase.gripper, phase)
 
-    def _enter(self, index: int, time: float) -> None:
-        self._index = index
-        self._entered = time
-        self._reached_at: float | None = None
-
     def _advance(self, view: View) -> None:
-        if self._index >= len(self._phases):
-            return
-        phase, time = self._phases[self._index], view.state.time
+        phase, time = self._phases[0], view.state.time
         patience = self._gains.patience * phase.patience
-        if self._reached_at is None and (_reached(phase, view) or time - self._entered > patience):
+        if self._reached_at is None and (phase.is_reached(view) or time - self._entered > patience):
             self._reached_at = time
-        if self._reached_at is not None and time - self._reached_at >= phase.dwell:
-            instead = self.replan(view, phase.name)
-            if instead is None:
-                self._enter(self._index + 1, time)
-            else:
-                self._begin(instead, time)
-
-
-def _reached(phase: ScriptPhase, view: View) -> bool:
-    if phase.focus == "base":
-        q = view.state.q
-        turn = np.arctan2(np.sin(phase.base[2] - q[2]), np.cos(phase.base[2] - q[2]))
-        return bool(np.hypot(*(phase.base[:2] - q[:2])) < phase.distance and abs(turn) < phase.angle)
-    distance, angle = pose_errors(view.tool, phase.hand)
-    if phase.beside:
-        *across, along = view.tool.rotation.T @ (view.tool.position - phase.hand.position)
-        distance = max(abs(along), np.hypot(*across) * phase.distance / phase.beside)
-    return bool(distance < phase.distance and angle < phase.angle)
+        if self._reached_at is None or time - self._reached_at < phase.dwell:
+            return
+        instead = self.replan(view, phase.name)
+        following = self._phases[1:] if instead is None else instead
+        if following:
+            self._begin(following, time)
+        else:
+            self._phases = [replace(phase, dwell=np.inf)]
 
 
 def from_phase(phases: list[ScriptPhase], name: str) -> list[ScriptPhase]:
     """Return the phases from the one of a name on."""
-    return phases[next(index for index, phase in enumerate(phases) if phase.name == name) :]
+    return phases[[phase.name for phase in phases].index(name) :]
 
 
 class Route:
@@ -135,10 +130,12 @@ class Route:
 
     def __init__(self, model: RobotModel, task: TaskState) -> None:
         self._model, self._scale = model, model.description.world.scale
+        self._size = model.description.base.size
         self._clearance = _ROUTE_CLEARANCE * self._scale
-        self._obstacles = floor_obstacles(task.start.scene)
-        behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in self._obstacles]
-        self.lane = float(min(behind, default=0.0)) - model.description.base.size[0] / 2 - self._clearance
+        circles = ((item, np.hypot(*item.shape.size[:2]) / 2) for item in floor_obstacles(task.start.scene))
+        self._circles = [(item.position[:2], radius) for item, radius in circles]
+        behind = [place[0] - radius for place, radius in self._circles]
+        self.lane = float(min(behind, default=0.0)) - self._size[0] / 2 - self._clearance
 
     def stand(self, place: FloatArray, edge: float) -> FloatArray:
         """Return where the base stands to work at a place, (3,): comfortable, and clear of the table.
@@ -148,8 +145,7 @@ class Route:
             edge: the x of the table's near edge [m].
         """
         base = standing_point(self._model, place, comfort=_FROM_ABOVE)
-        length = self._model.description.base.size[0]
-        base[0] = min(base[0], edge - length / 2 - self._clearance)
+        base[0] = min(base[0], edge - self._size[0] / 2 - self._clearance)
         return base
 
     def drive(self, start: FloatArray, goal: FloatArray, hand: Pose, gripper: float) -> list[ScriptPhase]:
@@ -165,12 +161,9 @@ class Route:
 
     def blocked(self, start: FloatArray, goal: FloatArray) -> bool:
         """Return whether something on the floor is in the chassis' way between two places, (2,) each."""
-        width = np.hypot(*self._model.description.base.size) / 2 + self._clearance / 2
-        for item in self._obstacles:
-            along = np.clip(
-                (item.position[:2] - start) @ (goal - start) / max(np.sum((goal - start) ** 2), 1e-9), 0, 1
-            )
-            gap = np.linalg.norm(item.position[:2] - start - along * (goal - start))
-            if gap < width + np.hypot(*item.shape.size[:2]) / 2:
+        width, way = np.hypot(*self._size) / 2 + self._clearance / 2, goal - start
+        for place, radius in self._circles:
+            along = np.clip((place - start) @ way / max(np.sum(way**2), 1e-9), 0, 1)
+            if np.linalg.norm(place - start - along * way) < width + radius:
                 return True
         return False

@@ -1,29 +1,21 @@
 """How an operator carries a cube from one table to a bin on another."""
 
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase, from_phase
-from handrail.collect.world.scene import SceneObject
 from handrail.collect.world.tasks.pick_place import grasp_rotation
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.model import RobotModel
 
 _HELD = 0.05  # a cube this near to the tool point is held [m]
 _BELOW = 0.005  # finger tips below the middle of the cube [m]
 _NEAR, _ALIGNED = 0.010, 0.10  # how exactly the hand has to be there to grasp [m, rad]
 _RETREAT = 0.40  # hand behind the table's edge while carrying [m]
 _AHEAD = 0.80  # hand before the base's centre while carrying [m]
-
-
-@dataclass(frozen=True)
-class _Place:
-    """What matters of a table: the near edge's x, the height, and the thing on it."""
-
-    edge: float
-    thing: FloatArray
+_OVER = 0.30  # hand above what it goes to while carrying [m]
 
 
 class PickPlaceScript(PhasedScript):
@@ -38,105 +30,84 @@ class PickPlaceScript(PhasedScript):
 
     def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the cube, over to the bin, and what is done at both."""
-        task = view.task
-        self._route = Route(self._model, task)
-        cube = task.pose("cube")
-        pick = _Place(task.object("cube_table").front, cube.position)
-        place = _Place(task.object("bin_table").front, task.pose("bin").position)
+        task, route, scale = view.task, Route(self._model, view.task), self._scale
+        cube, goal = task.pose("cube"), task.pose("bin").position
         down = grasp_rotation(view.tool.rotation, cube.rotation)
-        rim = task.object("bin").top - place.thing[2]
-        phases = self._pick(pick, down, self._room(task.object("cube")))
-        phases += self._carry(pick, place, down)
-        phases += self._place(place, down, rim)
-        lane = self._route.lane
+        pick, place = cube.position, goal
+        edges = [task.object(name).front for name in ("cube_table", "bin_table")]
+        stands = [route.stand(thing, edge) for thing, edge in zip((pick, place), edges, strict=True)]
+        ahead, lane = _AHEAD * scale, route.lane
+        over = pick[2] + _OVER * scale
+        first = ScriptPhase.at(
+            "stage",
+            np.array([edges[0] - 0.15 * scale, pick[1], over]),
+            down,
+            stands[0],
+            distance=0.10 * scale,
+            angle=0.30,
+        )
+        begin = [first]
         if self._drives:
-            *across, up = self._route.drive(view.state.q[:3], self._stand(pick), phases[0].hand, 0.0)
-            phases = [
-                *across,
-                self._ready(across[-1].base if across else view.state.q, pick, down),
-                up,
-                *phases,
+            *across, up = route.drive(view.state.q[:3], stands[0], first.hand, 0.0)
+            base = across[-1].base if across else view.state.q  # there the arm is folded first
+            hand = np.array([base[0] + ahead, base[1], over])
+            ready = ScriptPhase.at("ready", hand, down, base, distance=0.15 * scale, angle=0.5)
+            begin = [*across, ready, up, first]
+        elif route.blocked(view.state.q[:2], stands[0][:2]):
+            hand, base = np.array([lane + ahead, pick[1], over]), np.array([lane, pick[1], 0.0])
+            begin.insert(0, ScriptPhase.at("approach", hand, down, base, distance=0.15 * scale, angle=0.5))
+
+        height = max(pick[2], place[2]) + _OVER * scale
+
+        def carry(name: str, x: float, y: float, base: FloatArray) -> ScriptPhase:
+            near = {"distance": 0.12 * scale, "angle": 0.4, "gripper": 1.0}
+            return ScriptPhase.at(name, np.array([x, y, height]), down, base, **near)
+
+        if self._drives:
+            retreat = carry("retreat", stands[0][0] + ahead, pick[1], stands[0])
+            front = carry("front", stands[1][0] + ahead, place[1], stands[1])
+            way = [retreat, *route.drive(stands[0], stands[1], front.hand, 1.0)]
+        else:
+            way = [
+                carry("retreat", lane + ahead, pick[1], np.array([lane, pick[1], 0.0])),
+                carry("cross", lane + ahead, place[1], np.array([lane, place[1], 0.0])),
+                carry("front", edges[1] - _RETREAT * scale, place[1], stands[1]),
             ]
-        elif self._route.blocked(view.state.q[:2], self._stand(pick)[:2]):
-            height = cube.position[2] + 0.30 * self._scale
-            around = Pose(np.array([lane + _AHEAD * self._scale, cube.position[1], height]), down)
-            base = np.array([lane, cube.position[1], 0.0])
-            phases.insert(
-                0, ScriptPhase(around, base, name="approach", distance=0.15 * self._scale, angle=0.5)
-            )
-        return phases
+        rim = _above(place, task.object("bin").top - place[2])
+        room = self._room(float(task.object("cube").shape.size[0]))
+        return [*begin, *self._pick(pick, down, stands[0], room), *way, *self._place(rim, down, stands[1])]
 
-    def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> ScriptPhase:
-        """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
-        scale = self._scale
-        hand = np.array([base[0] + _AHEAD * scale, base[1], pick.thing[2] + 0.30 * scale])
-        return ScriptPhase(Pose(hand, down), base, name="ready", distance=0.15 * scale, angle=0.5)
-
-    def _room(self, cube: SceneObject) -> float:
+    def _room(self, width: float) -> float:
         """Return how far beside the cube the hand may be for the open fingers to close around it [m].
 
         `(stroke − w (cos a + sin a)) / 2` for a cube of width w that is turned by a; as much either way.
         """
-        gripper = self._model.description.end_effector.gripper
-        width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
-        near = _NEAR * self._grip
-        return near if gripper is None else max(near, (gripper.stroke - width) / 2)
+        gripper, near = self._model.description.end_effector.gripper, _NEAR * self._grip
+        turned = width * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
+        return near if gripper is None else max(near, (gripper.stroke - turned) / 2)
 
-    def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[ScriptPhase]:
+    def _pick(self, cube: FloatArray, down: FloatArray, base: FloatArray, room: float) -> list[ScriptPhase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
-        cube, base, scale, grip = pick.thing, self._stand(pick), self._scale, self._grip
-        stage = np.array([pick.edge - 0.15 * scale, cube[1], cube[2] + 0.30 * scale])
+        grip, at = self._grip, partial(ScriptPhase.at, rotation=down, base=base)
         grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
-        near = _NEAR * grip
-
-        def phase(name: str, position: FloatArray, **options: float) -> ScriptPhase:
-            return ScriptPhase(Pose(position, down), base, name=name, **options)  # type: ignore[arg-type]
-
+        exact = {"distance": _NEAR * grip, "beside": room, "angle": _ALIGNED}
         return [
-            phase("stage", stage, distance=0.10 * scale, angle=0.30),
-            phase("above", _above(cube, 0.14 * grip), distance=0.02 * grip, angle=0.10),
-            phase("descend", grasp, distance=near, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),
-            phase("grasp", grasp, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
-            phase("lift", _above(cube, 0.22 * grip), distance=0.04 * grip, angle=0.3, gripper=1.0, pace=0.6),
+            at("above", _above(cube, 0.14 * grip), distance=0.02 * grip, angle=0.10),
+            at("descend", grasp, pace=0.4, patience=8.0, **exact),
+            at("grasp", grasp, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            at("lift", _above(cube, 0.22 * grip), distance=0.04 * grip, angle=0.3, gripper=1.0, pace=0.6),
         ]
 
-    def _carry(self, pick: _Place, place: _Place, down: FloatArray) -> list[ScriptPhase]:
-        """Pull back until the base is behind the floor obstacles, cross, and go up to the other table."""
-        scale = self._scale
-        height = max(pick.thing[2], place.thing[2]) + 0.30 * scale
-        lane, ahead = self._route.lane, _AHEAD * scale
-        hand_lane = lane + ahead
-
-        def phase(name: str, x: float, at: _Place, base: FloatArray) -> ScriptPhase:
-            hand = Pose(np.array([x, at.thing[1], height]), down)
-            return ScriptPhase(hand, base, name=name, gripper=1.0, distance=0.12 * scale, angle=0.4)
-
-        if self._drives:
-            retreat = phase("retreat", self._stand(pick)[0] + ahead, pick, self._stand(pick))
-            front = phase("front", self._stand(place)[0] + ahead, place, self._stand(place))
-            return [retreat, *self._route.drive(self._stand(pick), self._stand(place), front.hand, 1.0)]
+    def _place(self, rim: FloatArray, down: FloatArray, base: FloatArray) -> list[ScriptPhase]:
+        """Go over the bin's rim, down, open the fingers, rise."""
+        grip, at = self._grip, partial(ScriptPhase.at, rotation=down, base=base)
+        over, low, high = (_above(rim, rise * grip) for rise in (0.18, 0.045, 0.25))
         return [
-            phase("retreat", hand_lane, pick, np.array([lane, pick.thing[1], 0.0])),
-            phase("cross", hand_lane, place, np.array([lane, place.thing[1], 0.0])),
-            phase("front", place.edge - _RETREAT * scale, place, self._stand(place)),
+            at("over", over, gripper=1.0, distance=0.03 * grip, angle=0.3),
+            at("lower", low, gripper=1.0, distance=0.025 * grip, angle=0.3, pace=0.4),
+            at("release", low, distance=1.0, angle=3.2, dwell=0.8),
+            at("rise", high, distance=0.05 * grip, angle=0.5),
         ]
-
-    def _place(self, place: _Place, down: FloatArray, height: float) -> list[ScriptPhase]:
-        rim = _above(place.thing, height)
-        base, grip = self._stand(place), self._grip
-
-        def phase(name: str, rise: float, **options: float) -> ScriptPhase:
-            return ScriptPhase(Pose(_above(rim, rise), down), base, name=name, **options)  # type: ignore[arg-type]
-
-        return [
-            phase("over", 0.18 * grip, gripper=1.0, distance=0.03 * grip, angle=0.3),
-            phase("lower", 0.045 * grip, gripper=1.0, distance=0.025 * grip, angle=0.3, pace=0.4),
-            phase("release", 0.045 * grip, distance=1.0, angle=3.2, dwell=0.8),
-            phase("rise", 0.25 * grip, distance=0.05 * grip, angle=0.5),
-        ]
-
-    def _stand(self, place: _Place) -> FloatArray:
-        return self._route.stand(place.thing, place.edge)
 
 
 def _above(position: FloatArray, height: float) -> FloatArray:

@@ -33,9 +33,8 @@ def arm_solutions(model: RobotModel, q: FloatArray, goal: Pose) -> list[tuple[Fl
         goal: of the tool.
     """
     base = len(model.description.base.joints)
-    starts = [q, np.concatenate([q[:base], model.description.home[base:]])]
-    for joint in range(base, model.size):
-        starts += [q + angle * (np.arange(model.size) == joint) for angle in _TURNS]
+    turns = (angle * axis for axis in np.eye(model.size)[base:] for angle in _TURNS)
+    starts = [q, np.concatenate([q[:base], model.description.home[base:]]), *(q + turn for turn in turns)]
     found = [arm_configuration(model, start, goal) for start in starts]
     unwound = [(_unwound(model, q, there), error) for there, error in found]
 
@@ -65,7 +64,7 @@ def straight_solution(
     solutions = arm_solutions(model, q, goal)
     best, widest = solutions[0][0], -np.inf
     for there, error in solutions:
-        kept = float(np.min(collision.values(q + _WAY * (there - q)))) if error < REACHED else -np.inf
+        kept = nearest(collision, q + _WAY * (there - q)) if error < REACHED else -np.inf
         if kept > widest:
             best, widest = there, kept
         if kept >= clear:
@@ -79,6 +78,11 @@ def _unwound(model: RobotModel, q: FloatArray, there: FloatArray) -> FloatArray:
     shorter = q + (there - q + np.pi) % (2.0 * np.pi) - np.pi
     allowed = (limits.position_lower <= shorter) & (shorter <= limits.position_upper)
     return np.where(allowed & (np.arange(model.size) >= base), shorter, there)
+
+
+def nearest(collision: CollisionModel, q: FloatArray) -> float:
+    """Return the smallest distance at configurations, (n,) or (k, n) [m]."""
+    return float(np.min(collision.values(np.atleast_2d(q))))
 
 
 def standing_point(
@@ -137,12 +141,11 @@ def standing_pose(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:
     if len(model.description.arm_joints) < 6:
         return _standing_in_line(model, q, goal)
     collision, best, fewest = CollisionModel(model), standing_point(model, goal.position), np.inf
+    clear = _SELF_CLEAR * model.description.world.scale
     for yaw in _YAWS:
         stand = standing_point(model, goal.position, yaw)
         there, error = arm_configuration(model, np.concatenate([stand, q[3:]]), goal)
-        lack = max(
-            _SELF_CLEAR * model.description.world.scale - float(np.min(collision.values(there[None, :]))), 0.0
-        ) + 10.0 * (error > 0.01)
+        lack = max(clear - nearest(collision, there), 0.0) + 10.0 * (error > REACHED)
         if lack < fewest:
             best, fewest = stand, lack
         if not lack:

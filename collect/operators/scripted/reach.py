@@ -12,14 +12,10 @@ class ReachScript(PhasedScript):
 
     def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way: drive to where the goal is in comfortable reach, then steer the hand to it."""
-        goal = view.task.goal or view.tool
-        base = standing_pose(self._model, view.state.q, goal)
-        phases = [ScriptPhase(goal, base, name="reach", distance=0.06 * self._scale, angle=0.25)]
-        far = (
-            np.hypot(*(base[:2] - view.state.q[:2])) > 0.4 * self._scale
-            or abs(base[2] - view.state.q[2]) > 0.2
-        )
-        if self._drives and far:
-            near = 0.15 * self._scale
-            phases.insert(0, ScriptPhase(goal, base, name="drive", focus="base", distance=near, angle=0.2))
-        return phases
+        goal, q, scale = view.task.goal or view.tool, view.state.q, self._scale
+        base = standing_pose(self._model, q, goal)
+        reach = ScriptPhase(goal, base, name="reach", distance=0.06 * scale, angle=0.25)
+        if self._drives and (np.hypot(*(base[:2] - q[:2])) > 0.4 * scale or abs(base[2] - q[2]) > 0.2):
+            near = 0.15 * scale
+            return [ScriptPhase(goal, base, name="drive", focus="base", distance=near, angle=0.2), reach]
+        return [reach]

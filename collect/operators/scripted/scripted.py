@@ -23,43 +23,25 @@ _POSITION_ORDER = 0.25 / 0.35  # refractory time of a position device over a vel
 
 @dataclass(frozen=True)
 class ScriptedDevice:
-    """What an operator has in hand; the numbers are a scripted person's, tuned on the same seeds for each.
+    """What an operator has in hand; the numbers are a scripted person's, tuned on the same seeds for each."""
 
-    Attributes:
-        name: as a mode names it.
-        help: one line.
-        build: its input map.
-        gains: how briskly they steer.
-        drives: whether they drive the base by itself from place to place, whatever the mode.
-        refractory: their refractory time over that of a velocity stick.
-    """
-
-    name: str
-    help: str
-    build: type[InputMap]
-    gains: Gains = field(default_factory=Gains)
-    drives: bool = False
-    refractory: float = 1.0
+    name: str  # as a mode names it
+    help: str  # one line
+    build: type[InputMap]  # its input map
+    gains: Gains = field(default_factory=Gains)  # how briskly they steer
+    drives: bool = False  # whether they drive the base by itself from place to place, whatever the mode
+    refractory: float = 1.0  # their refractory time over that of a velocity stick
 
 
+_BRISK = Gains(gain=1.8, hand_speed=0.7, joint_rate=1.2, patience=4.0)
+_LEADER = "a small copy of the arm, and a stick for the base"
 DEVICES = Registry(
     "device",
     ScriptedDevice,
     (
         ScriptedDevice("sticks", "velocity sticks on all channels of a mode", StickMap),
-        ScriptedDevice(
-            "single_axis",
-            "one stick, one axis at a time",
-            SingleAxisMap,
-            Gains(gain=1.8, hand_speed=0.7, joint_rate=1.2, patience=4.0),
-            drives=True,
-        ),
-        ScriptedDevice(
-            "leader_arm",
-            "a small copy of the arm, and a stick for the base",
-            LeaderArmMap,
-            refractory=_POSITION_ORDER,
-        ),
+        ScriptedDevice("single_axis", "one stick, one axis at a time", SingleAxisMap, _BRISK, drives=True),
+        ScriptedDevice("leader_arm", _LEADER, LeaderArmMap, refractory=_POSITION_ORDER),
     ),
 )
 
@@ -96,15 +78,9 @@ class ScriptedOperator:
     """
 
     def __init__(
-        self,
-        model: RobotModel,
-        script: Script,
-        mode: TeleopMode,
-        human: HumanSettings,
-        gains: Gains,
+        self, model: RobotModel, script: Script, mode: TeleopMode, human: HumanSettings, gains: Gains
     ) -> None:
-        self._script = script
-        self._mode = mode
+        self._script, self._mode = script, mode
         device = DEVICES.find(mode.device)
         self._map = device.build(model, mode, gains)
         self._human = replace(human, refractory=human.refractory * device.refractory)

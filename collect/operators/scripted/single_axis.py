@@ -5,8 +5,8 @@ import numpy as np
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.input_map import InputMap
-from handrail.collect.operators.scripted.placement import REACHED, arm_solutions
-from handrail.collect.operators.scripted.steering import MotionGoal, Target
+from handrail.collect.operators.scripted.placement import REACHED, arm_solutions, nearest
+from handrail.collect.operators.scripted.steering import MotionGoal, Target, base_errors
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.controller import State
@@ -19,8 +19,6 @@ _PREPARATION = 1.35  # of the mind before it thinks again: M of the keystroke-le
 _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
 _SMALL_SHARES = (1.0, 0.5, 0.25, 0.12, 0.06)  # the same where the hand must not lean
 _CLEAR = 0.03  # what a sweep shall keep clear [m]
-
-
 _SWEEP = np.linspace(0.25, 1.0, 4)  # where on a joint's way one looks whether something is hit
 
 
@@ -41,9 +39,9 @@ def plan_joints(
     """
     best, most = (q, list[int]()), -1.0
     arm = list(range(len(model.description.base.joints), model.size))
-    at_start = _nearest(collision, q)
+    at_start = nearest(collision, q)
     for there, error in arm_solutions(model, q, goal):
-        kept = min(clear, 0.9 * at_start, 0.9 * _nearest(collision, there))
+        kept = min(clear, 0.9 * at_start, 0.9 * nearest(collision, there))
         preferred = sorted(arm, key=lambda index: -abs(there[index] - q[index]))
         order = clear_order(collision, q, there, preferred, kept) if kept > 0.0 else []
         share = len(order) / len(arm) - (error > REACHED)
@@ -52,10 +50,6 @@ def plan_joints(
         if share == 1.0:
             break
     return best
-
-
-def _nearest(collision: CollisionModel, q: FloatArray) -> float:
-    return float(np.min(collision.values(q[None, :])))
 
 
 def clear_order(
@@ -84,11 +78,11 @@ def clear_order(
         now = q.copy()
         now[moved] = goal[moved]
         for joint in joints:
-            following = frozenset((*moved, joint))
-            if joint in moved or following in seen:
+            following = [*moved, joint]
+            if joint in moved or frozenset(following) in seen:
                 continue
             free = sweep_clearance(collision, now, joint, goal[joint] - now[joint]) >= clear
-            if free and search([*moved, joint]):
+            if free and search(following):
                 return True
         return False
 
@@ -107,7 +101,7 @@ def sweep_clearance(collision: CollisionModel, q: FloatArray, joint: int, way: f
     """
     path = np.tile(q, (len(_SWEEP), 1))
     path[:, joint] += _SWEEP * way
-    return float(np.min(collision.values(path)))
+    return nearest(collision, path)
 
 
 class SingleAxisMap(InputMap):
@@ -126,8 +120,7 @@ class SingleAxisMap(InputMap):
         self._axis_holds = False  # until the operator thinks again
         self._left = 0.0  # of the way that the axis shall not go this time
         self._goal = np.zeros(self._model.size)
-        self._thought = b""
-        self._thinks_at = -np.inf
+        self._thought, self._thinks_at = b"", -np.inf
         self._order: list[int] = []
         self._care = 1.0  # share of the usual tolerance: less after each attempt that was not good enough
 
@@ -139,13 +132,17 @@ class SingleAxisMap(InputMap):
             errors, tolerances = self._errors(goal, goal.target, state.q)
             axis = self._choose(goal.target, errors, tolerances, state.q)
             if axis is not None:
-                speed = self._fastest(goal.target, state.q)[axis]
-                values[axis] = self._push(errors[axis] - self._left, speed, self._least * self.full[axis])
+                values[axis] = self._push(goal.target, axis, errors[axis] - self._left, state.q)
         return np.arange(self.channels.size) == (self._axis or 0), values
 
-    def _push(self, way: float, fastest: float, slowest: float) -> float:
-        """Return the speed at which an axis is driven on its way; nobody pushes a stick below `slowest`."""
-        return float(np.sign(way) * np.clip(self._gains.gain * abs(way), min(slowest, fastest), fastest))
+    def _push(self, target: Target, axis: int, way: float, q: FloatArray) -> float:
+        """Return the speed of an axis on its way: no slower than a stick is pushed, or faster than the hand may."""
+        fastest = self.full[axis]
+        if axis >= self._arm.start:
+            lever = self._levers(q)[0][axis - self._arm.start]
+            fastest = min(fastest, target.pace * self._gains.hand_speed / lever)
+        slowest = min(self._least * self.full[axis], fastest)
+        return float(np.sign(way) * np.clip(self._gains.gain * abs(way), slowest, fastest))
 
     def _choose(
         self, target: Target, errors: FloatArray, tolerances: FloatArray, q: FloatArray
@@ -154,98 +151,81 @@ class SingleAxisMap(InputMap):
         axis = self._axis
         if self._axis_holds and axis is not None and abs(errors[axis] - self._left) > tolerances[axis]:
             return axis
-        off = np.abs(errors) / tolerances
-        rank = {index: place for place, index in enumerate(self._order)}
-        farthest = sorted(np.flatnonzero(off > 1.0).tolist(), key=lambda index: -off[index])
-        candidates = sorted(farthest, key=lambda index: rank.get(index, len(rank)))
         best, widest = None, -np.inf
-        for index, share in self._options(target, candidates, errors, off, q):
-            clear = self._clearance(index, share * errors[index], q)
+        for index, share in self._options(target, errors, np.abs(errors) / tolerances, q):
+            clear = _CLEAR  # of the base: the script says where to drive
+            if index >= self._arm.start:
+                way = share * errors[index]
+                clear = min(sweep_clearance(self._collision, q, self._coordinate(index), way), _CLEAR)
             if clear > widest:
                 best, widest = (index, share), clear
             if clear >= _CLEAR:
                 break
-        return self._take(*best, errors) if best else None
+        if best is None:
+            return None
+        index, share = best
+        self._axis_holds, self._axis, self._left = True, index, (1.0 - share) * errors[index]
+        return index
 
     def _options(
-        self, target: Target, candidates: list[int], errors: FloatArray, off: FloatArray, q: FloatArray
+        self, target: Target, errors: FloatArray, off: FloatArray, q: FloatArray
     ) -> list[tuple[int, float]]:
         """Return the axes and shares of their ways that matter, the best first.
 
-        All of the way before a part of it; where the hand must not lean, only what keeps it upright enough,
-        or straightens it most if nothing does.
+        In the order thought of, then the farthest off; all of the way before a part of it. Where the hand
+        must not lean, only what keeps it upright enough, or straightens it most if nothing does.
         """
+        rank = {index: place for place, index in enumerate(self._order)}
+        matter = np.flatnonzero(off > 1.0).tolist()
+        candidates = sorted(matter, key=lambda index: (rank.get(index, len(rank)), -off[index]))
         shares = _SHARES if np.isinf(target.tilt) else _SMALL_SHARES
         options = [(index, share) for share in shares for index in candidates if share * off[index] > 1.0]
         if np.isinf(target.tilt):
             return options
-        lean = {
-            (index, share): self._lean(target, index, share * errors[index], q) for index, share in options
-        }
+        lean = {option: self._lean(target, option[0], option[1] * errors[option[0]], q) for option in options}
         upright = [option for option in options if lean[option] <= target.tilt]
         return upright or sorted(options, key=lambda option: lean[option])
 
-    def _take(self, index: int, share: float, errors: FloatArray) -> int:
-        """Take an axis and go a share of its way."""
-        self._axis_holds = True
-        self._axis, self._left = index, (1.0 - share) * errors[index]
-        return index
+    def _coordinate(self, axis: int) -> int:
+        """Return which generalised coordinate an axis moves."""
+        return axis - self.channels.joint_slice.start if axis >= self._arm.start else axis
 
-    def _clearance(self, index: int, way: float, q: FloatArray) -> float:
-        """Return how much an arm joint's motion keeps clear of everything, no more than is asked for [m]."""
-        if index < self._arm.start:
-            return _CLEAR  # the script says where to drive
-        joint = index - self.channels.joint_slice.start
-        return min(sweep_clearance(self._collision, q, joint, way), _CLEAR)
-
-    def _lean(self, target: Target, index: int, way: float, q: FloatArray) -> float:
+    def _lean(self, target: Target, axis: int, way: float, q: FloatArray) -> float:
         """Return how far the hand leans from the target's axis after an axis' motion [rad]."""
         there = q.copy()
-        there[index - self.channels.joint_slice.start if index >= self._arm.start else index] += way
+        there[self._coordinate(axis)] += way
         upright = self._model.pose(there).rotation[:, 2] @ target.hand.rotation[:, 2]
         return float(np.arccos(np.clip(upright, -1.0, 1.0)))
 
     def _think(self, target: Target, state: State) -> None:
         """Work out which joints would do it, for a new target, or when they did not."""
-        done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
-        if target.identity == self._thought and not done:
+        q, known = state.q, target.identity == self._thought
+        off = np.abs(self._goal - q)[self._base :] / self._near(target, q)
+        if known and not (np.all(off < 1.0) and state.time >= self._thinks_at):
             return
-        self._goal, order = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
+        self._goal, order = plan_joints(self._model, self._collision, q, target.hand, _CLEAR)
         self._order = [self.channels.joint_slice.start + joint for joint in order]
-        self._care = 1.0 if target.identity != self._thought else max(0.5 * self._care, _MOST_CARE)
+        self._care = max(0.5 * self._care, _MOST_CARE) if known else 1.0
         self._thought, self._axis_holds = target.identity, False
         self._thinks_at = state.time + _PREPARATION
 
-    def _goal_error(self, target: Target, q: FloatArray) -> FloatArray:
-        """Return how far each arm joint is from where it was thought to belong, over `_near`, (n − b,)."""
-        return np.abs(self._goal - q)[self._base :] / self._near(target, q)
+    def _errors(self, goal: MotionGoal, target: Target, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how far each axis is from where it belongs, (m,), and how near is near enough, (m,)."""
+        errors, tolerances = np.zeros(self.channels.size), np.ones(self.channels.size)
+        if goal.focus == "base" and self._base:
+            errors[self.channels.base_slice] = turned(base_errors(q, target.base), -q[2])
+            tolerances[self.channels.base_slice] = 0.5 * np.array([*[target.distance] * 2, target.angle])
+        else:
+            errors[self._arm] = (self._goal - q)[self._base :]
+            tolerances[self._arm] = self._near(target, q)
+        return errors, tolerances
 
     def _near(self, target: Target, q: FloatArray) -> FloatArray:
         """Return how near is near enough for each arm joint, (n − b,) [rad]."""
         linear, angular = self._levers(q)
         return self._care * _NEAR * np.minimum(target.distance / linear, target.angle / angular)
 
-    def _errors(self, goal: MotionGoal, target: Target, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return how far each axis is from where it belongs, (m,), and how near is near enough, (m,)."""
-        errors, tolerances = np.zeros(self.channels.size), np.ones(self.channels.size)
-        if goal.focus == "base" and self._base:
-            turn = np.arctan2(np.sin(target.base[2] - q[2]), np.cos(target.base[2] - q[2]))
-            errors[self.channels.base_slice] = turned([*(target.base[:2] - q[:2]), turn], -q[2])
-            near = [target.distance, target.distance, target.angle]
-            tolerances[self.channels.base_slice] = 0.5 * np.array(near)
-        else:
-            errors[self._arm] = self._goal[self._base :] - q[self._base :]
-            tolerances[self._arm] = self._near(target, q)
-        return errors, tolerances
-
     def _levers(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return how far [m] and how much [rad] each arm joint moves the hand per radian, (n − b,) each."""
         jacobian = self._model.jacobian(q)[:, self._base :]
         return np.maximum(np.linalg.norm(jacobian[:3], axis=0), 0.05), np.linalg.norm(jacobian[3:], axis=0)
-
-    def _fastest(self, target: Target, q: FloatArray) -> FloatArray:
-        """Return the largest speed of each axis: full stick, and no faster than the hand may go, (m,)."""
-        speeds = self.full.copy()
-        linear, _ = self._levers(q)
-        speeds[self._arm] = np.minimum(speeds[self._arm], target.pace * self._gains.hand_speed / linear)
-        return speeds

@@ -16,25 +16,16 @@ FOLLOW = 6.0
 
 @dataclass(frozen=True)
 class Target:
-    """Where a goal leads.
+    """Where a goal leads."""
 
-    Attributes:
-        hand: pose of the tool.
-        base: where the base would stand, (x, y, θ).
-        distance: from it that is near enough [m].
-        angle: the same for orientation [rad].
-        pace: share of the full stick.
-        tilt: how far the hand may lean from the pose's axis on the way there [rad].
-        meant: the pose itself where `hand` is as somebody sees it, who misjudges; None where it is the same.
-    """
-
-    hand: Pose
-    base: FloatArray
-    distance: float = 0.05
-    angle: float = 0.2
-    pace: float = 1.0
-    tilt: float = np.inf
+    hand: Pose  # of the tool
+    base: FloatArray  # where the base would stand, (x, y, θ)
+    distance: float = 0.05  # from it that is near enough [m]
+    angle: float = 0.2  # the same for orientation [rad]
+    pace: float = 1.0  # share of the full stick
+    tilt: float = np.inf  # how far the hand may lean from the pose's axis on the way there [rad]
     meant: Pose | None = None
+    """The pose itself where `hand` is as somebody sees it, who misjudges; None where it is the same."""
 
     @property
     def identity(self) -> bytes:
@@ -45,21 +36,13 @@ class Target:
 
 @dataclass(frozen=True)
 class MotionGoal:
-    """What an operator wants the robot to do now, whatever the mode.
+    """What an operator wants the robot to do now, whatever the mode."""
 
-    Attributes:
-        hand: twist of the tool, world-aligned, (6,) [m/s, rad/s].
-        base: twist of the base in the base frame, (3,).
-        focus: which of the two matters now.
-        gripper: 0 open, 1 closed.
-        target: where that leads; None wants to rest.
-    """
-
-    hand: FloatArray
-    base: FloatArray
-    focus: Focus = "hand"
-    gripper: float = 0.0
-    target: Target | None = None
+    hand: FloatArray  # twist of the tool, world-aligned, (6,) [m/s, rad/s]
+    base: FloatArray  # twist of the base in the base frame, (3,)
+    focus: Focus = "hand"  # which of the two matters now
+    gripper: float = 0.0  # 0 open, 1 closed
+    target: Target | None = None  # where that leads; None wants to rest
 
     @classmethod
     def rest(cls, focus: Focus = "hand", gripper: float = 0.0) -> "MotionGoal":
@@ -74,34 +57,21 @@ class Gains:
     Pushing the stick in proportion to the distance to go, `v = gain · e`, obeys Fitts' law: from D to W it
     takes `ln(D / W) / gain`, a throughput of `gain / ln 2`. In people it is 1.6–2.6 bit/s with a velocity
     stick, 3.7–4.9 with a mouse: gains of 1.1–1.8 and 2.6–3.4.
-
-    Attributes:
-        gain: of the distance to go [1/s].
-        hand_speed: full stick of the hand's translation [m/s].
-        hand_rate: full stick of the hand's rotation [rad/s].
-        base_speed: full stick of the base's translation [m/s].
-        base_rate: full stick of the base's rotation [rad/s].
-        joint_rate: full stick of one joint [rad/s].
-        patience: how much longer than with a stick for the hand they try before they go on.
     """
 
-    gain: float = 1.2
-    hand_speed: float = 0.35
-    hand_rate: float = 0.6
-    base_speed: float = 0.5
-    base_rate: float = 0.3
-    joint_rate: float = 0.8
-    patience: float = 1.0
+    gain: float = 1.2  # of the distance to go [1/s]
+    hand_speed: float = 0.35  # full stick of the hand's translation [m/s]
+    hand_rate: float = 0.6  # full stick of the hand's rotation [rad/s]
+    base_speed: float = 0.5  # full stick of the base's translation [m/s]
+    base_rate: float = 0.3  # full stick of the base's rotation [rad/s]
+    joint_rate: float = 0.8  # full stick of one joint [rad/s]
+    patience: float = 1.0  # how much longer than with a stick for the hand they try before they go on
 
     def within(self, world: WorldScale) -> "Gains":
         """Return the gains in a robot's world: as brisk, full stick made to its measure."""
         speed, rate = world.scale * world.pace, world.pace
-        return replace(
-            self,
-            hand_speed=speed * self.hand_speed,
-            hand_rate=rate * self.hand_rate,
-            base_speed=speed * self.base_speed,
-        )
+        hand, base = speed * self.hand_speed, speed * self.base_speed
+        return replace(self, hand_speed=hand, hand_rate=rate * self.hand_rate, base_speed=base)
 
     @property
     def full(self) -> FloatArray:
@@ -121,9 +91,9 @@ def hand_twist(tool: Pose, goal: Pose, gains: Gains, pace: float = 1.0) -> Float
 
     `v = sat(gain (p_goal - p))`, `ω = sat(gain log(R_goal Rᵀ))`; `pace` scales the largest speeds.
     """
-    errors = hand_errors(tool, goal)
-    linear = saturated(gains.gain * errors[:3], pace * gains.hand_speed)
-    return np.concatenate([linear, saturated(gains.gain * errors[3:], pace * gains.hand_rate)])
+    linear, angular = np.split(gains.gain * hand_errors(tool, goal), 2)
+    speeds = saturated(linear, pace * gains.hand_speed), saturated(angular, pace * gains.hand_rate)
+    return np.concatenate(speeds)
 
 
 def hand_errors(tool: Pose, goal: Pose) -> FloatArray:
@@ -132,15 +102,20 @@ def hand_errors(tool: Pose, goal: Pose) -> FloatArray:
     return np.concatenate([goal.position - tool.position, turn])
 
 
-def base_twist(q: FloatArray, goal: FloatArray, gains: Gains) -> FloatArray:
-    """Return the twist that drives the base to (x, y, θ), in the base frame, (3,)."""
-    world = saturated(gains.gain * (goal[:2] - q[:2]), gains.base_speed)
-    turn = np.arctan2(np.sin(goal[2] - q[2]), np.cos(goal[2] - q[2]))
-    rate = np.clip(gains.gain * turn, -gains.base_rate, gains.base_rate)
-    return turned([*world, rate], -q[2])
-
-
 def pose_errors(tool: Pose, goal: Pose) -> tuple[float, float]:
     """Return distance [m] and angle [rad] between two poses."""
-    distance = float(np.linalg.norm(goal.position - tool.position))
-    return distance, float(np.linalg.norm(rotation_vector(goal.rotation @ tool.rotation.T)))
+    way, turn = np.split(hand_errors(tool, goal), 2)
+    return float(np.linalg.norm(way)), float(np.linalg.norm(turn))
+
+
+def base_errors(q: FloatArray, goal: FloatArray) -> FloatArray:
+    """Return how far the base has to go to (x, y, θ), and to turn the shorter way, in the world, (3,)."""
+    turn = goal[2] - q[2]
+    return np.array([*(goal[:2] - q[:2]), np.arctan2(np.sin(turn), np.cos(turn))])
+
+
+def base_twist(q: FloatArray, goal: FloatArray, gains: Gains) -> FloatArray:
+    """Return the twist that drives the base to (x, y, θ), in the base frame, (3,)."""
+    *way, turn = gains.gain * base_errors(q, goal)
+    rate = np.clip(turn, -gains.base_rate, gains.base_rate)
+    return turned([*saturated(np.array(way), gains.base_speed), rate], -q[2])

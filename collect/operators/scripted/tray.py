@@ -1,12 +1,13 @@
 """How an operator carries a tray past obstacles and puts it down on a table."""
 
+from functools import partial
+
 import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase
 from handrail.collect.world.task import reach_share
 from handrail.collect.world.tasks.tray import HANDLE
-from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose
 
 _OVER = 0.10  # the tray above the table while it comes near [m]
@@ -22,24 +23,22 @@ class TrayScript(PhasedScript):
 
     def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the table, and what is done there."""
-        task, route = view.task, Route(self._model, view.task)
-        table = task.object("table")
+        route, table = Route(self._model, view.task), view.task.object("table")
         place = np.array([table.front + _INSIDE, table.position[1], table.top + HANDLE[2] + _ABOVE])
         stand = route.stand(place, table.front)
-        height = max(view.tool.position[2], place[2] + _OVER)
-
-        def phase(name: str, hand: FloatArray, base: FloatArray, **options: float) -> ScriptPhase:
-            return ScriptPhase(Pose(hand, _DOWN), base, name=name, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
-
         over, up = (place + np.array([0.0, 0.0, rise]) for rise in (_OVER, _OVER + 0.08))
+        at = partial(ScriptPhase.at, rotation=_DOWN, base=stand)
+        slow = {"pace": 0.25, "patience": 8.0, "gripper": 1.0}
         phases = [
-            phase("over", over, stand, distance=0.02, angle=0.15, pace=0.7, tilt=_TILT),
-            phase("lower", place, stand, distance=0.012, angle=3.2, pace=0.25, tilt=_TILT, patience=8.0),
-            phase("release", place, stand, distance=1.0, angle=3.2, gripper=0.0, dwell=1.0),
-            phase("rise", up, stand, distance=0.03, angle=3.2, tilt=_TILT, gripper=0.0),
+            at("over", over, distance=0.02, angle=0.15, pace=0.7, tilt=_TILT, gripper=1.0),
+            at("lower", place, distance=0.012, angle=3.2, tilt=_TILT, **slow),
+            at("release", place, distance=1.0, angle=3.2, dwell=1.0),
+            at("rise", up, distance=0.03, angle=3.2, tilt=_TILT),
         ]
         if self._drives:
             return route.drive(view.state.q[:3], stand, Pose(over, _DOWN), 1.0) + phases
+        height = max(view.tool.position[2], place[2] + _OVER)
         crossing = np.array([route.lane + _AHEAD * reach_share(self._model), place[1], height])
         lane = np.array([route.lane, place[1], 0.0])
-        return [phase("cross", crossing, lane, distance=0.12, angle=0.4), *phases]
+        cross = ScriptPhase.at("cross", crossing, _DOWN, lane, gripper=1.0, distance=0.12, angle=0.4)
+        return [cross, *phases]
