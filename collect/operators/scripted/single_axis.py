@@ -136,7 +136,7 @@ class SingleAxisMap(InputMap):
         return np.arange(self.channels.size) == (self._axis or 0), values
 
     def _push(self, target: Target, axis: int, way: float, q: FloatArray) -> float:
-        """Return the speed of an axis on its way: no slower than a stick is pushed, or faster than the hand may."""
+        """Return the speed of an axis on its way, of a stick that is pushed; no faster than the hand may."""
         fastest = self.full[axis]
         if axis >= self._arm.start:
             lever = self._levers(q)[0][axis - self._arm.start]
