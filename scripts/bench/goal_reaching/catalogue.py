@@ -21,26 +21,18 @@ class Baseline:
     """A controller in the benchmark: one entry makes it. What is `module:name` is imported when it is built.
 
     Functions are a module's own, so that worker processes find them.
-
-    Attributes:
-        name: as on the command line.
-        help: one line.
-        build: `(model, period [s]) -> Controller`.
-        operator: what the planner's twist becomes, `(model) -> (twist, state, time) -> Intent`; made anew for
-            every episode.
-        period: between two updates [s]; None: the planner's.
-        aims: whether the controller needs to know the goal; then it has `aim(goal)`.
-        lag: time constants of a low-pass before it, of the hand's translation and turn [s]; a planner that
-            sees the hand knows them.
     """
 
-    name: str
-    help: str
-    build: Callable[..., Any] | str
+    name: str  # as on the command line
+    help: str  # one line
+    build: Callable[..., Any] | str  # `(model, period [s]) -> Controller`
     operator: Callable[..., Any] | str = f"{_HERE}:hand_intent"
-    period: float | None = None
-    aims: bool = False
+    """What the planner's twist becomes, `(model) -> (twist, state, time) -> Intent`; anew an episode."""
+    period: float | None = None  # between two updates [s]; None: the planner's
+    aims: bool = False  # whether the controller needs to know the goal; then it has `aim(goal)`
     lag: tuple[float, float] = (0.0, 0.0)
+    """Time constants of a low-pass before it, of the hand's translation and turn [s]; a planner that sees the
+    hand knows them."""
 
     def controller(self, model: Any) -> Any:
         """Return the controller of a robot."""

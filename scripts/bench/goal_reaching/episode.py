@@ -1,6 +1,5 @@
 """One episode of the benchmark: planner, command profile, controller, robot, through the one session."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from time import process_time
@@ -14,6 +13,7 @@ from handrail.collect.world.scene import Scene
 from handrail.collect.world.task import FixedTask, Start, TaskState, Verdict
 from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, reached
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import rotation_vector
@@ -32,21 +32,13 @@ _SETTLING = 134  # steps after the planner's last one, without early stop (4 s)
 
 @dataclass(frozen=True)
 class Conditions:
-    """What an episode is run under; the same for every controller.
+    """What an episode is run under; the same for every controller."""
 
-    Attributes:
-        goal: to reach.
-        scene: obstacles.
-        config: of the benchmark: physics, early stop, a planner that sees the hand.
-        profile: how the planner's twist arrives.
-        seed: of the profile's noise, delays and dropouts.
-    """
-
-    goal: Pose
-    scene: Scene
-    config: BenchmarkConfig
-    profile: str = "nominal"
-    seed: tuple[int, ...] = (0,)
+    goal: Pose  # to reach
+    scene: Scene  # obstacles
+    config: BenchmarkConfig  # physics, early stop, a planner that sees the hand
+    profile: str = "nominal"  # how the planner's twist arrives
+    seed: tuple[int, ...] = (0,)  # of the profile's noise, delays and dropouts
 
 
 def run_episode(
@@ -61,7 +53,7 @@ def run_episode(
         conditions: goal, scene, commands.
     """
     start = process_time()
-    operator = _Planner(conditions, resolved(baseline.operator)(model), baseline.lag)
+    operator = _Planner(conditions, baseline, model)
     begin = Start(conditions.scene, model.description.home)
     judge = partial(_judged, given=conditions, planner=operator)
     task = FixedTask(begin, judge, horizon=(T_MAX - 0.5) * STEP)
@@ -76,13 +68,9 @@ class _Planner:
 
     name = "planner"
 
-    def __init__(
-        self,
-        conditions: Conditions,
-        ask: Callable[[FloatArray, State, float], Intent],
-        lag: tuple[float, float] = (0.0, 0.0),
-    ) -> None:
-        self._conditions, self._ask, self._lead = conditions, ask, np.repeat(lag, 3)
+    def __init__(self, conditions: Conditions, baseline: Baseline, model: RobotModel) -> None:
+        self._conditions, self._ask = conditions, resolved(baseline.operator)(model)
+        self._lead = np.repeat(baseline.lag, 3)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Plan the way from here."""
@@ -141,29 +129,28 @@ class _Observer:
     def begin(self, env: HandrailEnv, seed: int) -> None:
         if self._baseline.aims:
             self._controller.aim(self._goal)  # pyright: ignore[reportAttributeAccessIssue]
-        self._env = env
-        self._states, self._tools = [env.plant.state()], [env.plant.tool]
+        self._plant = env.plant
+        self._states, self._tools = [self._plant.state()], [self._plant.tool]
         self._contacts: list[tuple[str, ...]] = []
-        self._frames: list[Frame] = []
+        self._updates: dict[int, Diagnostics] = {}  # an update's are in all frames until the next
 
     def see(self, frame: Frame) -> None:
-        self._states.append(self._env.plant.state())
-        self._tools.append(self._env.plant.tool)
-        self._contacts.append(self._env.plant.contacts)
-        self._frames.append(frame)
-
-    def _error(self, tool: Pose) -> tuple[float, float]:
-        return pose_error(tool.position, tool.rotation, self._goal)
+        self._states.append(self._plant.state())
+        self._tools.append(self._plant.tool)
+        self._contacts.append(self._plant.contacts)
+        self._updates[id(frame.diagnostics)] = frame.diagnostics
 
     def trace(self, end: int, wall_time: float, cpu_time: float) -> Trace:
-        """Return what was noted; an update's diagnostics are in all frames until the next."""
+        """Return what was noted."""
         return Trace(
             q=np.array([state.q for state in self._states]),
             v=np.array([state.v for state in self._states[1:]]),
-            errors=np.array([self._error(tool) for tool in self._tools[1:]]),
+            errors=np.array(
+                [pose_error(tool.position, tool.rotation, self._goal) for tool in self._tools[1:]]
+            ),
             hand=np.array([tool.position for tool in self._tools]),
             contacts=self._contacts,
-            updates=list({id(frame.diagnostics): frame.diagnostics for frame in self._frames}.values()),
+            updates=list(self._updates.values()),
             end=end,
             wall_time=wall_time,
             cpu_time=cpu_time,

@@ -7,9 +7,10 @@ import numpy as np
 
 from handrail.controllers.robot.model import Pose
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
+from handrail.scripts.bench.goal_reaching.metrics import SHOWN
 from handrail.scripts.bench.goal_reaching.results import column, rows_of
 from handrail.scripts.bench.goal_reaching.run import BenchEpisode
-from handrail.scripts.bench.goal_reaching.tables import HEADINGS, PUBLISHED
+from handrail.scripts.bench.goal_reaching.tables import PUBLISHED
 
 CAPTIONS = {
     "distributions": "Every episode's measures; dashed: means published, grey RL, orange proposed.",
@@ -20,7 +21,7 @@ CAPTIONS = {
 }
 _BASE, _HAND = COLOURS[:2]
 _WIDTH = 11.0  # [inch]
-_SHOWN = (
+_DRAWN = (
     "final_position_error",
     "final_orientation_error",
     "arm_effort",
@@ -56,9 +57,9 @@ def _panels(labels: Sequence[str], draw: Callable[[Any, str], None]) -> Any:
     """Return a figure with a panel for each measure, and a line in it for each label, from the top down."""
     figure = new_figure(_WIDTH, 1.4 + 0.55 * len(labels))
     axes = np.ravel(figure.subplots(2, 3, sharey=True))
-    for ax, metric in zip(axes, _SHOWN, strict=True):
+    for ax, metric in zip(axes, _DRAWN, strict=True):
         draw(ax, metric)
-        ax.set(title=HEADINGS[metric])
+        ax.set(title=SHOWN[metric][0])
         ax.set_yticks(range(len(labels)), labels)
         tidy(ax, "x")
     axes[0].invert_yaxis()
@@ -135,7 +136,7 @@ def _profiles(results: Mapping[str, Any]) -> Any:
         jerk = [cell["jerkiness"]["mean"] if "jerkiness" in cell else np.nan for cell in cells]
         lower.errorbar(at, jerk, **style)
     upper.set(ylabel="success % (95 % interval)", ylim=(0, 105))
-    lower.set(ylabel=HEADINGS["jerkiness"], yscale="log")
+    lower.set(ylabel=SHOWN["jerkiness"][0], yscale="log")
     lower.set_xticks(range(len(profiles)), profiles)
     upper.legend(fontsize=8, ncols=5, loc="lower center")
     for ax in (upper, lower):

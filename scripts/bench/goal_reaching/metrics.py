@@ -12,52 +12,51 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.command import Diagnostics
 from handrail.datasets.quality.metrics import path_length
 
-METRICS = (
-    "success",
-    "final_position_error",
-    "final_orientation_error",
-    "length",
-    "arm_effort",
-    "base_path",
-    "jerkiness",
-    "wall_time_s",
-)
-"""Those of the paper's Table I, in its order."""
-
-COST_METRICS = ("cpu_time_s", "update_ms_median", "updates_per_s")
+TABLE_I = {
+    "success": ("success %", 1),
+    "final_position_error": ("position error m", 3),
+    "final_orientation_error": ("orientation error", 3),
+    "length": ("length steps", 1),
+    "arm_effort": ("arm effort", 1),
+    "base_path": ("base path m", 2),
+    "jerkiness": ("jerkiness", 3),
+    "wall_time_s": ("wall time s", 2),
+}
+"""Those of the paper's Table I, in its order: name → heading with its unit, digits that are shown."""
+COST = {
+    "cpu_time_s": ("CPU time s", 2),
+    "update_ms_median": ("update ms", 2),
+    "updates_per_s": ("updates a second", 1),
+}
 """What a controller costs: of an episode, of an update (median of the episode's), updates a second of it."""
-
-SAFETY_METRICS = ("contacts", "smallest_distance", "brakes")
-SETTLED_METRICS = ("planned_position_error", "planned_orientation_error")
+SAFETY = {
+    "contacts": ("steps in contact", 1),
+    "smallest_distance": ("smallest distance m", 3),
+    "brakes": ("braked updates", 1),
+}
+SETTLED = {
+    "planned_position_error": ("position error at the planner's end m", 4),
+    "planned_orientation_error": ("orientation error at the planner's end", 4),
+}
 """Errors right after the planner's last step; only of episodes that got there."""
+METRICS = tuple(TABLE_I)
+SHOWN = {**TABLE_I, **COST, **SAFETY, **SETTLED}
 AIM = 0.01  # position error within which a planner that sees the hand was to bring it [m]
 
 
 @dataclass(frozen=True)
 class Trace:
-    """What happened in an episode of T steps.
+    """What happened in an episode of T steps."""
 
-    Attributes:
-        q: positions before the first and after every step, (T + 1, n).
-        v: the simulated joint velocities after every step, (T, n).
-        errors: (d_p [m], d_r) after every step, (T, 2).
-        hand: the tool's positions before the first and after every step [m], (T + 1, 3).
-        contacts: names of the forbidden contacts of every step, T tuples.
-        updates: of the controller.
-        end: first step from which on nothing but rest arrives from the planner.
-        wall_time: of the episode, controller, physics and collision checking together [s].
-        cpu_time: of the process in that time [s]; other programs do not lengthen it.
-    """
-
-    q: FloatArray
-    v: FloatArray
-    errors: FloatArray
-    hand: FloatArray
-    contacts: Sequence[tuple[str, ...]]
-    updates: Sequence[Diagnostics]
-    end: int
-    wall_time: float
-    cpu_time: float
+    q: FloatArray  # positions before the first and after every step, (T + 1, n)
+    v: FloatArray  # the simulated joint velocities after every step, (T, n)
+    errors: FloatArray  # (d_p [m], d_r) after every step, (T, 2)
+    hand: FloatArray  # the tool's positions before the first and after every step [m], (T + 1, 3)
+    contacts: Sequence[tuple[str, ...]]  # names of the forbidden contacts of every step, T tuples
+    updates: Sequence[Diagnostics]  # of the controller
+    end: int  # first step from which on nothing but rest arrives from the planner
+    wall_time: float  # of the episode, controller, physics and collision checking together [s]
+    cpu_time: float  # of the process in that time [s]; other programs do not lengthen it
 
 
 def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any]:
@@ -89,7 +88,7 @@ def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any
         "updates": len(trace.updates),
         "update_ms_median": 1e3 * float(np.median([update.solve_time for update in trace.updates])),
         "updates_per_s": len(trace.updates) / (len(trace.v) * STEP),
-        **dict(zip(SETTLED_METRICS, planned, strict=True)),
+        **dict(zip(SETTLED, planned, strict=True)),
     }
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner
-from handrail.controllers.arrays import FloatArray, IntArray, frozen
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import unknown_name
 from handrail.scripts.bench.goal_reaching.config import PROFILES
 
@@ -24,25 +24,12 @@ _KEYS = np.array([0.15] * 3 + [0.5] * 3)  # `quantised`: what a key commands [m/
 
 @dataclass(frozen=True)
 class Commands:
-    """What an operator sends in each of the T steps of an episode, and what of it arrives.
+    """What an operator sends in each of the T steps of an episode, and what of it arrives."""
 
-    Attributes:
-        twists: sent, world-aligned at the tool [m/s, rad/s], (T, 6).
-        progress: how far along its line the planner is, in its own steps, (T,).
-        delivered: which message is the newest that arrived, (T,); `NOTHING_YET` before the first.
-        end: first step from which on nothing but rest arrives.
-    """
-
-    twists: FloatArray
-    progress: FloatArray
-    delivered: IntArray
-    end: int
-
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "twists", frozen(self.twists))
-        object.__setattr__(self, "progress", frozen(self.progress))
-        object.__setattr__(self, "delivered", frozen(self.delivered, dtype=np.int64))
+    twists: FloatArray  # sent, world-aligned at the tool [m/s, rad/s], (T, 6)
+    progress: FloatArray  # how far along its line the planner is, in its own steps, (T,)
+    delivered: IntArray  # which message is the newest that arrived, (T,); `NOTHING_YET` before the first
+    end: int  # first step from which on nothing but rest arrives
 
 
 def profile_commands(profile: str, planner: StraightPlanner, rng: np.random.Generator) -> Commands:
@@ -70,7 +57,9 @@ def profile_commands(profile: str, planner: StraightPlanner, rng: np.random.Gene
         twists = _noisy(twists, rng)
     elif profile == "quantised":
         twists = _quantised(twists)
-    return Commands(twists, progress[:-1], delivered, _end(twists, delivered))
+    arriving = np.where(delivered[:, None] == NOTHING_YET, 0.0, twists[delivered])
+    moving = np.flatnonzero(arriving.any(axis=1))
+    return Commands(twists, progress[:-1], delivered, int(moving[-1]) + 1 if len(moving) else 0)
 
 
 def _delayed(rng: np.random.Generator) -> IntArray:
@@ -125,9 +114,3 @@ def _quantised(twists: FloatArray) -> FloatArray:
         pressed[part] = keys * _KEYS
         owed -= keys * quantum
     return pressed
-
-
-def _end(twists: FloatArray, delivered: IntArray) -> int:
-    arriving = np.where(delivered[:, None] == NOTHING_YET, 0.0, twists[delivered])
-    moving = np.flatnonzero(arriving.any(axis=1))
-    return int(moving[-1]) + 1 if len(moving) else 0

@@ -13,18 +13,12 @@ from handrail.datasets.statistics.paired import paired_difference, paired_succes
 from handrail.scripts.bench.goal_reaching.baselines import goal_reaching_settings, paper_settings
 from handrail.scripts.bench.goal_reaching.catalogue import TAKE_UP, Baseline
 from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
-from handrail.scripts.bench.goal_reaching.metrics import (
-    AIM,
-    COST_METRICS,
-    METRICS,
-    SAFETY_METRICS,
-    SETTLED_METRICS,
-)
+from handrail.scripts.bench.goal_reaching.metrics import AIM, METRICS, SAFETY, SETTLED, SHOWN
 from handrail.scripts.bench.goal_reaching.scenes import PHYSICS
 
 Row = Mapping[str, Any]
 _COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
-_KEPT = (*(name for name in METRICS if name != "wall_time_s"), *SAFETY_METRICS, *SETTLED_METRICS)
+_KEPT = (*(name for name in METRICS if name != "wall_time_s"), *SAFETY, *SETTLED)
 _PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
 
 
@@ -50,7 +44,7 @@ def summarise(
     return {
         "controllers": summaries[profiles[0]],
         "profiles": summaries,
-        "paired": {profile: _paired(list(cells[profile].items()), config.seed) for profile in profiles},
+        "paired": {profile: _paired(cells[profile], config.seed) for profile in profiles},
         "titles": {baseline.name: baseline.help for baseline in baselines},
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
@@ -95,7 +89,7 @@ def column(rows: Sequence[Row], metric: str, known: bool = False) -> FloatArray:
 
 def _summary(rows: Sequence[Row]) -> dict[str, Any]:
     summary: dict[str, Any] = {"episodes": len(rows)}
-    for metric in (*METRICS, *COST_METRICS, *SAFETY_METRICS, *SETTLED_METRICS):
+    for metric in SHOWN:
         values = column(rows, metric, known=True)
         if len(values):
             summary[metric] = {
@@ -112,16 +106,15 @@ def _summary(rows: Sequence[Row]) -> dict[str, Any]:
     return summary
 
 
-def _paired(cells: Sequence[tuple[str, Sequence[Row]]], seed: int) -> dict[str, Any]:
+def _paired(cells: Mapping[str, Sequence[Row]], seed: int) -> dict[str, Any]:
     """Return the first controller against every other, first minus other."""
     rng = np.random.default_rng([seed, 99])
-    (_, first), *others = cells
-    return {name: _against(first, other, rng) for name, other in others} if len(first) > 1 else {}
-
-
-def _against(first: Sequence[Row], other: Sequence[Row], rng: np.random.Generator) -> dict[str, Any]:
-    success = paired_success(column(first, "success"), column(other, "success"))
-    result: dict[str, Any] = {"success": asdict(success)}
-    for metric in _COMPARED:
-        result[metric] = asdict(paired_difference(column(first, metric), column(other, metric), rng))
-    return result
+    (_, first), *others = cells.items()
+    found: dict[str, Any] = {}
+    for name, other in others if len(first) > 1 else ():
+        success = paired_success(column(first, "success"), column(other, "success"))
+        found[name] = {"success": asdict(success)}
+        for metric in _COMPARED:
+            difference = paired_difference(column(first, metric), column(other, metric), rng)
+            found[name][metric] = asdict(difference)
+    return found

@@ -46,12 +46,16 @@ def cluttered_floor(model: RobotModel, goal: Pose, rng: np.random.Generator) -> 
     hand = model.pose(model.description.home).position[:2]
     placed: list[SceneObject] = []
     for radius, height in _CYLINDERS:
-        clear = _CLEAR_HAND if height > goal.position[2] - radius else 0.0
+        tall = height > goal.position[2] - radius
         for _ in range(_TRIES):
-            x, y = rng.uniform(*_AREA)
-            item = pillar(f"cylinder_{len(placed)}", x, y, radius, height)
-            aside = not clear or _distance_to_line(item.position[:2], hand, goal.position[:2]) >= clear
-            if aside and _apart(item, placed) and clearance(model, item.obstacle()) >= _CLEAR_START:
+            item = pillar(f"cylinder_{len(placed)}", *rng.uniform(*_AREA), radius, height)
+            way = _distance_to_line(item.position[:2], hand, goal.position[:2])
+            apart = all(_between(item, other) >= _CLEAR_EACH_OTHER for other in placed)
+            if (
+                (way >= _CLEAR_HAND or not tall)
+                and apart
+                and clearance(model, item.obstacle()) >= _CLEAR_START
+            ):
                 placed.append(item)
                 break
         else:
@@ -59,10 +63,10 @@ def cluttered_floor(model: RobotModel, goal: Pose, rng: np.random.Generator) -> 
     return Scene(tuple(placed), VIEW)
 
 
-def _apart(item: SceneObject, others: list[SceneObject]) -> bool:
-    ways = [float(np.linalg.norm(other.position[:2] - item.position[:2])) for other in others]
-    sizes = [footprint(other) + footprint(item) for other in others]
-    return all(way - size >= _CLEAR_EACH_OTHER for way, size in zip(ways, sizes, strict=True))
+def _between(one: SceneObject, other: SceneObject) -> float:
+    """Return how far apart two cylinders stand [m]."""
+    way = float(np.linalg.norm(other.position[:2] - one.position[:2]))
+    return way - (footprint(other) + footprint(one))
 
 
 def clearance(model: RobotModel, obstacle: Obstacle) -> float:

@@ -5,36 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 from handrail.datasets.presentation.table import Cell, Table
-from handrail.scripts.bench.goal_reaching.metrics import (
-    AIM,
-    COST_METRICS,
-    METRICS,
-    SAFETY_METRICS,
-    SETTLED_METRICS,
-)
+from handrail.scripts.bench.goal_reaching.metrics import AIM, COST, METRICS, SAFETY, SETTLED, SHOWN
 
-HEADINGS = {
-    "success": "success %",
-    "final_position_error": "position error m",
-    "final_orientation_error": "orientation error",
-    "length": "length steps",
-    "arm_effort": "arm effort",
-    "base_path": "base path m",
-    "jerkiness": "jerkiness",
-    "wall_time_s": "wall time s",
-    "cpu_time_s": "CPU time s",
-    "update_ms_median": "update ms",
-    "updates_per_s": "updates a second",
-    "planned_position_error": "position error at the planner's end m",
-    "planned_orientation_error": "orientation error at the planner's end",
-    "smallest_distance": "smallest distance m",
-    "contacts": "steps in contact",
-    "brakes": "braked updates",
-}
-_ONE = ("success", "length", "arm_effort", "contacts", "brakes", "updates_per_s")
-_TWO = ("base_path", "wall_time_s", "cpu_time_s", "update_ms_median")
-_FOUR = ("planned_position_error", "planned_orientation_error")
-_DIGITS = {**dict.fromkeys(_ONE, 1), **dict.fromkeys(_TWO, 2), **dict.fromkeys(_FOUR, 4)}
 _COMPARED = ("success", "final_position_error", "arm_effort", "base_path", "jerkiness", "update_ms_median")
 _PAIRED = (
     "The first controller minus each other one, same goals: mean, 95 % bootstrap interval, p of Wilcoxon's"
@@ -44,11 +16,8 @@ _PAIRED = (
 
 
 def _published(*table: tuple[float, ...]) -> dict[str, dict[str, float]]:
-    statistics = ("mean", "std", "min", "max")
-    return {
-        metric: dict(zip(statistics, values, strict=False))
-        for metric, values in zip(METRICS, table, strict=True)
-    }
+    rows = (dict(zip(("mean", "std", "min", "max"), values, strict=False)) for values in table)
+    return dict(zip(METRICS, rows, strict=True))
 
 
 PUBLISHED: Mapping[str, Mapping[str, Mapping[str, float]]] = {
@@ -84,8 +53,8 @@ def benchmark_tables(results: Mapping[str, Any]) -> list[Table]:
 
 def profile_tables(results: Mapping[str, Any], profile: str) -> list[Table]:
     """Return the tables of one profile that have something in them."""
-    settled = {} if results["config"]["early_stop"] else {"at the planner's end": SETTLED_METRICS}
-    groups = {"outcome": METRICS[:4], "effort": METRICS[4:], "computing": COST_METRICS, **settled}
+    settled = {} if results["config"]["early_stop"] else {"at the planner's end": tuple(SETTLED)}
+    groups = {"outcome": METRICS[:4], "effort": METRICS[4:], "computing": tuple(COST), **settled}
     made = [_measures(results, group, profile, title) for title, group in groups.items()]
     made += [_settling(results, profile)] if settled and results["config"]["closed_loop"] else []
     made.append(_safety(results, profile))
@@ -96,7 +65,7 @@ def profile_tables(results: Mapping[str, Any], profile: str) -> list[Table]:
 def _table(
     first: Sequence[str], metrics: Sequence[str], rows: Sequence[Sequence[Cell | str]], title: str
 ) -> Table:
-    return Table((*first, *(HEADINGS[metric] for metric in metrics)), rows, title)
+    return Table((*first, *(SHOWN[metric][0] for metric in metrics)), rows, title)
 
 
 def _measures(results: Mapping[str, Any], metrics: Sequence[str], profile: str, title: str) -> Table:
@@ -127,16 +96,16 @@ def _cells(summary: Mapping[str, Any], metrics: Sequence[str]) -> list[Cell]:
 
 def _number(metric: str, value: float) -> str:
     """Return a value as it is printed; success in per cent."""
-    return f"{100.0 * value if metric == 'success' else value:.{_DIGITS.get(metric, 3)}f}"
+    return f"{100.0 * value if metric == 'success' else value:.{SHOWN[metric][1]}f}"
 
 
 def _safety(results: Mapping[str, Any], profile: str) -> Table:
     """Return contacts, distances and brakes of every controller."""
     rows = [
-        [name, f"{each['episodes_with_contact']} of {each['episodes']}", *_cells(each, SAFETY_METRICS)]
+        [name, f"{each['episodes_with_contact']} of {each['episodes']}", *_cells(each, tuple(SAFETY))]
         for name, each in results["profiles"][profile].items()
     ]
-    return _table(("controller", "episodes with contact"), SAFETY_METRICS, rows, "safety")
+    return _table(("controller", "episodes with contact"), tuple(SAFETY), rows, "safety")
 
 
 def _settling(results: Mapping[str, Any], profile: str) -> Table:
@@ -176,15 +145,10 @@ def _difference(metric: str, entry: Mapping[str, Any]) -> Cell:
 
 def _all_profiles(results: Mapping[str, Any]) -> Table:
     """Return success and jerkiness of every controller under every profile."""
-    shown, profiles = ("success", "jerkiness"), results["profiles"]
-    rows = [
-        [
-            name,
-            *(
-                " / ".join(cell.text.split(" ±")[0] for cell in _cells(each[name], shown))
-                for each in profiles.values()
-            ),
-        ]
-        for name in results["controllers"]
-    ]
+    shown, profiles, rows = ("success", "jerkiness"), results["profiles"], []
+    for name in results["controllers"]:
+        means = (
+            [cell.text.split(" ±")[0] for cell in _cells(each[name], shown)] for each in profiles.values()
+        )
+        rows.append([name, *map(" / ".join, means)])
     return Table(("success % / jerkiness", *profiles), rows, "success % / jerkiness by profile")
