@@ -8,7 +8,7 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from collect_helpers import action, environment, moved, write_small_robot
+from collect_helpers import action, environment, write_small_robot
 from gymnasium.utils.env_checker import check_env
 
 from handrail.collect.world.gl import mujoco
@@ -78,37 +78,6 @@ def test_render_is_a_picture_of_the_asked_size():
     with environment(render_mode="rgb_array", render_size=(120, 160)) as env:
         env.reset(seed=0)
         assert env.render().shape == (120, 160, 3)
-
-
-def test_limits_hold_for_any_action():
-    """Velocity, acceleration and gripper; also for actions out of range or not finite."""
-    rng = np.random.default_rng(0)
-    with environment("Reach") as env:
-        env.reset(seed=0)
-        limits = env.model.description.limits
-        for index in range(60):
-            drive = rng.normal(scale=5.0, size=env.model.size + 1)
-            if index % 7 == 0:
-                drive[rng.integers(len(drive))] = [np.nan, np.inf, -np.inf][index % 3]
-            before = env.state().commanded
-            *_, info = env.step(drive)
-            after = env.state().commanded
-            np.testing.assert_array_equal(info["sent"][:-1], after)
-            assert 0.0 <= info["sent"][-1] <= 1.0
-            assert np.all(np.abs(after) <= limits.velocity * (1.0 + 1e-6))
-            assert np.all(np.abs(after - before) <= limits.acceleration / env.fps * (1.0 + 1e-5))
-
-
-def test_an_action_that_is_no_action_brakes():
-    with environment("Reach") as env:
-        for bad in (np.full(10, np.nan), np.zeros(3), np.array([0.5] * 9 + [np.nan])):
-            env.reset(seed=0)
-            for _ in range(5):
-                env.step(action(env, [0.2] + [0.0] * 8))
-            for _ in range(10):
-                *_, info = env.step(bad)
-            np.testing.assert_array_equal(info["sent"], 0.0)
-            np.testing.assert_array_equal(env.state().commanded, 0.0)
 
 
 def test_a_reachable_action_is_sent_as_it_is():
@@ -236,11 +205,3 @@ def test_mujoco_runs_as_configured():
         options = env.simulation.mujoco_model.opt
         assert options.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         assert options.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
-
-
-def test_moved_is_a_new_episode():
-    with environment() as env:
-        env.reset(seed=0)
-        before = env.start
-        after = moved(before, "cube", [0.0, 0.0, 2.0])
-        assert before.scene.find("cube").position[2] < 1.0 < after.scene.find("cube").position[2]

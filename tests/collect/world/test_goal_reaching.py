@@ -27,6 +27,8 @@ def test_goals_fill_their_range_and_nothing_else():
     angles = np.array([np.linalg.norm(pin.log3(goal.rotation)) for goal in goals])
     assert np.all(np.abs(positions.min(axis=0) - [-1.0, -1.0, 0.7]) < 0.01)
     assert np.all(np.abs(positions.max(axis=0) - [1.0, 1.0, 1.0]) < 0.01)
+    shares = np.quantile((positions - [-1.0, -1.0, 0.7]) / [2.0, 2.0, 0.3], [0.25, 0.5, 0.75], axis=0)
+    np.testing.assert_allclose(shares, np.outer([0.25, 0.5, 0.75], np.ones(3)), atol=0.03)
     assert np.quantile(angles, [0.25, 0.5, 0.75]) == pytest.approx(np.pi * np.array([1, 2, 3]) / 4, abs=0.1)
 
 

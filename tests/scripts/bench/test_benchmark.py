@@ -88,7 +88,17 @@ def test_the_report_carries_everything_with_it(written):
     assert len(sources) == 4  # paths, distributions, profiles, paired
     assert all(source.startswith("data:image/svg+xml;base64,") for source in sources)
     assert all(base64.b64decode(s.split(",")[1]).startswith(b"<?xml") for s in sources)
-    for words in ("masked MPC", "paper: proposed", "0.098 ± 0.047", "Wilcoxon", "fast3", "dt 0."):
+    for words in (
+        "masked MPC",
+        "mpc minus",
+        "success %",
+        "paper: RL",
+        "paper: proposed",
+        "0.098 ± 0.047",
+        "Wilcoxon",
+        "fast3",
+        "dt 0.",
+    ):
         assert words in html
 
 
@@ -126,14 +136,6 @@ def test_report_and_terminal_hold_a_closed_loop_to_its_aim(tmp_path):
     for text in (html, console.export_text()):
         assert "beyond 10 mm" in text
         assert "4 s later" in text
-
-
-def test_tables_show_every_controller(written):
-    console = Console(width=200, record=True, file=StringIO())
-    console.print(*benchmark_tables(written[1]))
-    text = console.export_text()
-    for words in ("mpc", "dls", "paper: RL", "success %", "mpc minus"):
-        assert words in text
 
 
 DROPOUTS = BenchmarkConfig(goals=2, profile="dropouts", physics=False)
@@ -245,15 +247,8 @@ WRONG = {
     "no controllers": (["--controllers", ","], "--controllers: expected all, or some of mpc, rl"),
     "twice": (["--controllers", "mpc,mpc"], "--controllers mpc,mpc: expected each controller once"),
     "goals": (["--goals", "0"], "--goals: expected a whole number >= 1"),
-    "seed": (["--seed", "-1"], "--seed: expected a whole number >= 0"),
-    "workers": (["--workers", "1000"], "--workers 1000: expected a whole number from 1 to 256"),
-    "json": (
-        ["--json", "/nowhere/at/all.json"],
-        "/nowhere/at/all.json: expected a file in an existing",
-    ),
     "page": (["--page", "results.txt"], "--page results.txt: expected a .md file"),
     "report": (["--report", __file__], "expected a folder, found a file"),
-    "text": (["--goals", "many"], "--goals"),
 }
 
 
