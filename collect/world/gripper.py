@@ -128,7 +128,7 @@ def _add_finger(
 ) -> MjsBody:
     """Add a finger that slides (lever 1), or turns; its coordinate is 0 where it is closed [m, rad]."""
     body = palm.add_body(name=f"{name}_body", gravcomp=1.0, **geometry.pose(at.translation, at.rotation))
-    pad = pad or pin.SE3.Identity()
+    pad = pin.SE3.Identity() if pad is None else pad
     geometry.set_box_inertia(body, gripper.finger_mass, gripper.finger_size, pad.translation)
     _add_pad(body, gripper, name, pad)
     if grips:

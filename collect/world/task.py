@@ -180,6 +180,7 @@ def reach_share(model: RobotModel) -> float:
 
 def hand_rotation(x: ArrayLike, z: ArrayLike) -> FloatArray:
     """Return the rotation of a hand that points along z and opens along x, unit vectors, (3, 3)."""
+    x, z = np.asarray(x), np.asarray(z)
     return np.column_stack([x, np.cross(z, x), z])
 
 

@@ -90,10 +90,9 @@ class PickPlaceScript(PhasedScript):
         """Go above the cube, down until it is between the fingers, close them, lift."""
         grip, at = self._grip, partial(ScriptPhase.at, rotation=down, base=base)
         grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
-        exact = {"distance": _NEAR * grip, "beside": room, "angle": _ALIGNED}
         return [
             at("above", _above(cube, 0.14 * grip), distance=0.02 * grip, angle=0.10),
-            at("descend", grasp, pace=0.4, patience=8.0, **exact),
+            at("descend", grasp, distance=_NEAR * grip, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),
             at("grasp", grasp, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
             at("lift", _above(cube, 0.22 * grip), distance=0.04 * grip, angle=0.3, gripper=1.0, pace=0.6),
         ]

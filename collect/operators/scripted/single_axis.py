@@ -182,7 +182,9 @@ class SingleAxisMap(InputMap):
         options = [(index, share) for share in shares for index in candidates if share * off[index] > 1.0]
         if np.isinf(target.tilt):
             return options
-        lean = {option: self._lean(target, option[0], option[1] * errors[option[0]], q) for option in options}
+        lean = {
+            (index, share): self._lean(target, index, share * errors[index], q) for index, share in options
+        }
         upright = [option for option in options if lean[option] <= target.tilt]
         return upright or sorted(options, key=lambda option: lean[option])
 

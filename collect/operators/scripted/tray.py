@@ -28,10 +28,9 @@ class TrayScript(PhasedScript):
         stand = route.stand(place, table.front)
         over, up = (place + np.array([0.0, 0.0, rise]) for rise in (_OVER, _OVER + 0.08))
         at = partial(ScriptPhase.at, rotation=_DOWN, base=stand)
-        slow = {"pace": 0.25, "patience": 8.0, "gripper": 1.0}
         phases = [
             at("over", over, distance=0.02, angle=0.15, pace=0.7, tilt=_TILT, gripper=1.0),
-            at("lower", place, distance=0.012, angle=3.2, tilt=_TILT, **slow),
+            at("lower", place, distance=0.012, angle=3.2, pace=0.25, tilt=_TILT, patience=8.0, gripper=1.0),
             at("release", place, distance=1.0, angle=3.2, dwell=1.0),
             at("rise", up, distance=0.03, angle=3.2, tilt=_TILT),
         ]

@@ -48,7 +48,8 @@ def cluttered_floor(model: RobotModel, goal: Pose, rng: np.random.Generator) -> 
     for radius, height in _CYLINDERS:
         tall = height > goal.position[2] - radius
         for _ in range(_TRIES):
-            item = pillar(f"cylinder_{len(placed)}", *rng.uniform(*_AREA), radius, height)
+            x, y = rng.uniform(*_AREA)
+            item = pillar(f"cylinder_{len(placed)}", x, y, radius, height)
             way = _distance_to_line(item.position[:2], hand, goal.position[:2])
             apart = all(_between(item, other) >= _CLEAR_EACH_OTHER for other in placed)
             if (

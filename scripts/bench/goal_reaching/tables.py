@@ -16,7 +16,8 @@ _PAIRED = (
 
 
 def _published(*table: tuple[float, ...]) -> dict[str, dict[str, float]]:
-    rows = (dict(zip(("mean", "std", "min", "max"), values, strict=False)) for values in table)
+    statistics: tuple[str, ...] = ("mean", "std", "min", "max")
+    rows = (dict(zip(statistics, values, strict=False)) for values in table)
     return dict(zip(METRICS, rows, strict=True))
 
 
