@@ -12,6 +12,7 @@ from handrail.collect.config import RecordConfig
 from handrail.collect.lekiwi.link import Link, connect
 from handrail.collect.session.build import build_env
 from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.plant import Plant
 from handrail.collect.world.scene import Scene
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
@@ -77,7 +78,7 @@ def open_client(config: RecordConfig) -> tuple[HandrailEnv, Link]:
     return env, link
 
 
-class ClientPlant:
+class ClientPlant(Plant):
     """Drives a robot in real time; it begins with the arm where the task has it, the base where it stands.
 
     Where the base stands is taken for where the task has put it. Things are taken to be where the task has
@@ -91,10 +92,9 @@ class ClientPlant:
         seed: of the episode.
     """
 
-    is_stable = True
-
     def __init__(self, model: RobotModel, scene: Scene, q: FloatArray, link: Link, seed: int) -> None:
-        self._model, self._scene, self._link = model, scene, link
+        super().__init__(model, scene)
+        self._link = link
         self._collision = CollisionModel(model, scene.obstacles())
         link.begin(seed)
         bring_home(link, q, scene.obstacles())
@@ -137,11 +137,6 @@ class ClientPlant:
         return self.state().time
 
     @property
-    def tool(self) -> Pose:
-        """The pose of the tool point, by the measured joints and the odometry."""
-        return self._model.pose(self._link.state.q)
-
-    @property
     def opening(self) -> float:
         """How far the gripper is open, from 0 to 1."""
         return self._link.body.opening
@@ -152,18 +147,6 @@ class ClientPlant:
         distances = self._collision.values(self._link.state.q[None])[0]
         return tuple(" – ".join(self._collision.pairs[index]) for index in np.flatnonzero(distances < 0.0))
 
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        """Return what stands around, where the task has put it."""
-        return self._scene.obstacles(self.time)
-
-    def held(self) -> tuple[Obstacle, ...]:
-        """Return nothing: nobody knows."""
-        return ()
-
     def poses(self) -> Mapping[str, Pose]:
         """Return where the task has put every scene object, by name."""
         return {item.name: Pose(item.position, item.rotation) for item in self._scene.objects}
-
-    def still(self) -> frozenset[str]:
-        """Return nothing: nobody knows."""
-        return frozenset()

@@ -50,10 +50,9 @@ def _shifted(x: float, z: float) -> pin.SE3:
 def _add_sliding_fingers(spec: MjSpec, gripper: Gripper, palm: MjsBody, grips: bool) -> MjsBody:
     width, depth, length = gripper.finger_size
     apart = width / 2 + (0.0 if grips else gripper.stroke / 2)
+    height, pad = gripper.tip - length / 2, pin.SE3.Identity()
     left, _ = (
-        _add_finger(
-            palm, gripper, name, _shifted(side * apart, gripper.tip - length / 2), [side, 0.0, 0.0], grips
-        )
+        _add_finger(palm, gripper, name, _shifted(side * apart, height), [side, 0.0, 0.0], grips, pad)
         for name, side in zip(FINGERS, (-1.0, 1.0), strict=True)
     )
     thickness = min(0.025, (gripper.tip - length) / 2)
@@ -123,12 +122,11 @@ def _add_finger(
     at: pin.SE3,
     axis: list[float],
     grips: bool,
-    pad: pin.SE3 | None = None,
+    pad: pin.SE3,
     lever: float = 1.0,
 ) -> MjsBody:
     """Add a finger that slides (lever 1), or turns; its coordinate is 0 where it is closed [m, rad]."""
     body = palm.add_body(name=f"{name}_body", gravcomp=1.0, **geometry.pose(at.translation, at.rotation))
-    pad = pin.SE3.Identity() if pad is None else pad
     geometry.set_box_inertia(body, gripper.finger_mass, gripper.finger_size, pad.translation)
     _add_pad(body, gripper, name, pad)
     if grips:

@@ -1,24 +1,22 @@
 """The ideal robot: it does exactly what it is sent, in a world where nothing can be moved."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.world.plant import Gate
+from handrail.collect.world.plant import Gate, Plant
 from handrail.collect.world.scene import Scene
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State
-from handrail.controllers.robot.model import Pose, RobotModel
-from handrail.controllers.robot.shape import Obstacle
+from handrail.controllers.robot.model import RobotModel
 
 _FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
 
 
-class IdealRobot:
+class IdealRobot(Plant):
     """A plant that integrates what it is sent; shapes that overlap count as contacts.
 
     Args:
@@ -30,8 +28,6 @@ class IdealRobot:
         grip: None, for nothing can be held.
         gate: what every command passes; by default one that sends a dataset's numbers.
     """
-
-    is_stable = True
 
     def __init__(
         self,
@@ -46,7 +42,8 @@ class IdealRobot:
         if scene.movables or grip is not None:
             things = ", ".join(item.name for item in scene.movables)
             raise HandrailError(f"ideal robot: expected a scene where nothing can be moved, got {things}")
-        self._model, self._scene, self._step = model, scene, step
+        super().__init__(model, scene)
+        self._step = step
         self._gate = gate or Gate(model, step)
         self._collision = CollisionModel(model, scene.obstacles())
         self._q, self._steps = np.array(q), 0
@@ -91,11 +88,6 @@ class IdealRobot:
         return self._steps * self._step
 
     @property
-    def tool(self) -> Pose:
-        """The pose of the tool point."""
-        return self._model.pose(self._q)
-
-    @property
     def opening(self) -> float:
         """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
         return 1.0 - self._gate.gripper if self._model.description.end_effector.gripper else 0.0
@@ -105,22 +97,3 @@ class IdealRobot:
         """The pairs of shapes that overlap now."""
         overlaps = np.flatnonzero(self._distances < 0.0)
         return tuple(" – ".join(self._collision.pairs[index]) for index in overlaps)
-
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        """Return what stands around, where it is now."""
-        return self._scene.obstacles(self.time)
-
-    def held(self) -> tuple[Obstacle, ...]:
-        """Return nothing: it holds nothing."""
-        return ()
-
-    def poses(self) -> Mapping[str, Pose]:
-        """Return where every scene object is now, by name."""
-        return {
-            item.name: Pose(item.patrol.position(self.time) if item.patrol else item.position, item.rotation)
-            for item in self._scene.objects
-        }
-
-    def still(self) -> frozenset[str]:
-        """Return nothing: nothing can be moved."""
-        return frozenset()

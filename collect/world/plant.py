@@ -1,8 +1,9 @@
 """A robot and the world around it, as a session asks them, and the last gate before a robot."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -13,17 +14,33 @@ from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
 
+if TYPE_CHECKING:  # which loads MuJoCo
+    from handrail.collect.world.scene import Scene
 
-class Plant(Protocol):
+
+class Plant(ABC):
     """A robot that follows velocities, one command a period, and the world by whose truth a task judges.
 
-    It is the one owner of what the robot was sent last.
+    It is the one owner of what the robot was sent last. Where nothing can be moved, nothing is held.
+
+    Args:
+        model: of the robot.
+        scene: what stands around it.
     """
 
+    def __init__(self, model: RobotModel, scene: "Scene") -> None:
+        self._model, self._scene = model, scene
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the physics went well so far."""
+        return True
+
+    @abstractmethod
     def state(self) -> State:
         """Return the measured positions, velocities and time, and the velocity that was sent last."""
-        ...
 
+    @abstractmethod
     def send(self, command: ArrayLike) -> NDArray[np.floating[Any]]:
         """Reach velocities linearly over one period, inside the limits; return what was sent, (n + 1,).
 
@@ -31,58 +48,58 @@ class Plant(Protocol):
             command: velocities at the end of the period [m/s, rad/s] and gripper (1 closed), (n + 1,); one
                 of another size, or that is not finite, brakes.
         """
-        ...
 
+    @abstractmethod
     def stop(self) -> None:
         """Come to rest as fast as the limits allow, and stay there; the gripper stays as it is."""
 
+    @abstractmethod
     def checkpoint(self) -> object:
         """Return the whole state, robot and things, to come back to."""
-        ...
 
+    @abstractmethod
     def restore(self, checkpoint: Any) -> None:
         """Come back to a state: from there all goes on as it did."""
 
     @property
+    @abstractmethod
     def time(self) -> float:
         """Since the episode began [s]."""
-        ...
+
+    @property
+    @abstractmethod
+    def opening(self) -> float:
+        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
+
+    @property
+    @abstractmethod
+    def contacts(self) -> tuple[str, ...]:
+        """The forbidden contacts in the last period."""
 
     @property
     def tool(self) -> Pose:
         """The pose of the tool point."""
-        ...
-
-    @property
-    def opening(self) -> float:
-        """How far the gripper is open, from 0 to 1."""
-        ...
-
-    @property
-    def contacts(self) -> tuple[str, ...]:
-        """The forbidden contacts in the last period."""
-        ...
-
-    @property
-    def is_stable(self) -> bool:
-        """Whether the physics went well so far."""
-        ...
+        return self._model.pose(self.state().q)
 
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what a controller has to avoid besides the floor, where it is now, what is held among it."""
-        ...
+        return (*self._scene.obstacles(self.time), *self.held())
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""
-        ...
+        return ()
 
     def poses(self) -> Mapping[str, Pose]:
         """Return where every scene object is now, by name."""
-        ...
+        time = self.time
+        return {
+            item.name: Pose(item.patrol.position(time) if item.patrol else item.position, item.rotation)
+            for item in self._scene.objects
+        }
 
     def still(self) -> frozenset[str]:
         """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
-        ...
+        return frozenset()
 
 
 @runtime_checkable

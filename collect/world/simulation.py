@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.world.contacts import Contacts
 from handrail.collect.world.gl import MjSpec, mujoco
 from handrail.collect.world.gripper import FINGERS
-from handrail.collect.world.plant import Gate
+from handrail.collect.world.plant import Gate, Plant
 from handrail.collect.world.robot import BASE_BODY, build_robot, grasp_geoms
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.stage import add_scene
@@ -26,7 +26,7 @@ _TIMESTEP = 0.002  # [s]
 _UNSTABLE = ("mjWARN_BADQACC", "mjWARN_BADQVEL", "mjWARN_BADQPOS")
 
 
-class Simulation:
+class Simulation(Plant):
     """A plant: a fresh MuJoCo model and data; nothing of an earlier episode can remain in it.
 
     Args:
@@ -59,7 +59,8 @@ class Simulation:
     ) -> None:
         if grip is not None and not grips:
             raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
-        self._model, self._scene, self._step = model, scene, step
+        super().__init__(model, scene)
+        self._step = step
         self._gripper = model.description.end_effector.gripper if grips else None
         self._gate = gate or Gate(model, step, float(grip is not None))
         substeps = math.ceil(step / timestep - 1e-9)
@@ -216,10 +217,6 @@ class Simulation:
         velocities = {item.name: self.data.joint(item.name).qvel for item in self._scene.movables}
         norm = np.linalg.norm  # of v; of ω, of which what slides has none
         return frozenset(name for name, v in velocities.items() if norm(v[:3]) < 0.02 and norm(v[3:]) < 0.2)
-
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        """Return what stands around, where it is now, and what the fingers hold, fixed to the tool."""
-        return (*self._scene.obstacles(self.time), *self.held())
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""

@@ -183,7 +183,8 @@ class SingleAxisMap(InputMap):
         if np.isinf(target.tilt):
             return options
         lean = {
-            (index, share): self._lean(target, index, share * errors[index], q) for index, share in options
+            (index, share): self._lean(target, index, float(share * errors[index]), q)
+            for index, share in options
         }
         upright = [option for option in options if lean[option] <= target.tilt]
         return upright or sorted(options, key=lambda option: lean[option])

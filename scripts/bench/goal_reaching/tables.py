@@ -16,8 +16,8 @@ _PAIRED = (
 
 
 def _published(*table: tuple[float, ...]) -> dict[str, dict[str, float]]:
-    statistics: tuple[str, ...] = ("mean", "std", "min", "max")
-    rows = (dict(zip(statistics, values, strict=False)) for values in table)
+    statistics = ("mean", "std", "min", "max")
+    rows = (dict[str, float](zip(statistics, values, strict=False)) for values in table)
     return dict(zip(METRICS, rows, strict=True))
 
 
