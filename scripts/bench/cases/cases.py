@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.collect.world.scene import Colour, Scene, SceneObject, Viewpoint
+from handrail.collect.world.scene import Colour, FrozenArrays, Scene, SceneObject, Viewpoint
 from handrail.collect.world.tasks.furniture import pillar
-from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.shape import Shape
@@ -19,37 +19,25 @@ _ASIDE = (1.86, *_AHEAD[1:])  # the hand to the left
 _RADIUS, _TURN = 0.25, 12.0  # of case C's circle [m], and its period [s]
 _START = np.array([0.0134, 0.39])  # where the base stands when the hand is at the held point
 _HELD = (1.5, 0.4, 0.7)
+_OF_HAND, _OF_BASE = ("ee.vx", "ee.vy", "ee.vz"), ("base.vx", "base.vy", "base.wz")
 
 
 @dataclass(frozen=True)
-class PaperCase:
-    """One case.
+class PaperCase(FrozenArrays):
+    """One case."""
 
-    Attributes:
-        name: a, b or c.
-        title: one line.
-        scene: obstacles, markers, camera.
-        q: where the robot starts, (n,).
-        seconds: how long [s].
-        channels: what the operator commands.
-        command: time [s] and length of the run [s] → values of these channels.
-        frames: in which frames they are meant.
-        held: point where the hand is held by the hold objective [m]; empty when it is switched off.
-    """
-
-    name: str
-    title: str
-    scene: Scene
-    q: FloatArray
-    seconds: float
-    channels: tuple[str, ...]
-    command: Callable[[float, float], FloatArray]
-    frames: Frames = field(default_factory=Frames)
+    name: str  # a, b or c
+    title: str  # one line
+    scene: Scene  # obstacles, markers, camera
+    q: FloatArray  # where the robot starts, (n,)
+    seconds: float  # how long [s]
+    channels: tuple[str, ...]  # what the operator commands
+    command: Callable[
+        [float, float], FloatArray
+    ]  # time [s] and length of the run [s] → values of these channels
+    frames: Frames = field(default_factory=Frames)  # in which frames they are meant
     held: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "q", frozen(self.q))
+    """Point where the hand is held by the hold objective [m]; empty when it is switched off."""
 
 
 def cases() -> Mapping[str, PaperCase]:
@@ -58,72 +46,40 @@ def cases() -> Mapping[str, PaperCase]:
 
 
 def _hand_forward() -> PaperCase:
-    scene = Scene(
-        (
-            pillar("low_1", 1.3, -0.4, 0.3, 0.3),
-            pillar("low_2", 3.0, 0.9, 0.3, 0.3),
-            _line("asked", (-0.013, 0.01, 0.004), (3.987, 0.01, 0.004), _HAND),
-        ),
-        Viewpoint(position=(0.8, -4.9, 3.3), target=(1.0, 0.15, 0.35), fovy=38.0),
-    )
-    return PaperCase(
-        name="a",
-        title="A: the operator steers the hand forward; the base goes round the low obstacles",
-        scene=scene,
-        q=np.array([-1.5, 0.0, 0.0, *_AHEAD]),
-        seconds=21.0,
-        channels=("ee.vx", "ee.vy", "ee.vz"),
-        command=lambda time, end: np.array([0.2 * _ramp(time, end), 0.0, 0.0]),
-    )
+    low = (pillar("low_1", 1.3, -0.4, 0.3, 0.3), pillar("low_2", 3.0, 0.9, 0.3, 0.3))
+    line = _line("asked", (-0.013, 0.01, 0.004), (3.987, 0.01, 0.004), _HAND)
+    view = Viewpoint(position=(0.8, -4.9, 3.3), target=(1.0, 0.15, 0.35), fovy=38.0)
+    title = "A: the operator steers the hand forward; the base goes round the low obstacles"
+    q = np.array([-1.5, 0.0, 0.0, *_AHEAD])
+    return PaperCase("a", title, Scene((*low, line), view), q, 21.0, _OF_HAND, _forward)
 
 
 def _base_forward() -> PaperCase:
-    scene = Scene(
-        (
-            pillar("tall_1", 1.5, 1.0, 0.25, 1.5),
-            pillar("tall_2", 2.2, 0.7, 0.25, 1.5),
-            _line("asked", (-1.5, 0.0, 0.004), (1.0, 0.0, 0.004), _BASE),
-        ),
-        Viewpoint(position=(-1.0, -3.8, 3.1), target=(0.4, 0.35, 0.6), fovy=38.0),
-    )
-    return PaperCase(
-        name="b",
-        title="B: the operator drives the base forward; the arm keeps clear of the obstacles",
-        scene=scene,
-        q=np.array([-1.5, 0.0, 0.0, *_ASIDE]),
-        seconds=13.5,
-        channels=("base.vx", "base.vy", "base.wz"),
-        command=lambda time, end: np.array([0.2 * _ramp(time, end), 0.0, 0.0]),
-    )
+    tall = (pillar("tall_1", 1.5, 1.0, 0.25, 1.5), pillar("tall_2", 2.2, 0.7, 0.25, 1.5))
+    line = _line("asked", (-1.5, 0.0, 0.004), (1.0, 0.0, 0.004), _BASE)
+    view = Viewpoint(position=(-1.0, -3.8, 3.1), target=(0.4, 0.35, 0.6), fovy=38.0)
+    title = "B: the operator drives the base forward; the arm keeps clear of the obstacles"
+    q = np.array([-1.5, 0.0, 0.0, *_ASIDE])
+    return PaperCase("b", title, Scene((*tall, line), view), q, 13.5, _OF_BASE, _forward)
 
 
 def _base_circle() -> PaperCase:
-    centre = _START + [_RADIUS, 0.0]
-    angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
-    dots = tuple(
-        SceneObject(
-            f"asked_{index}",
-            Shape("cylinder", np.array([0.015, 0.004])),
-            np.array([*(centre + _RADIUS * np.array([np.cos(angle), np.sin(angle)])), 0.002]),
-            rgba=_BASE,
-            ghost=True,
-        )
-        for index, angle in enumerate(angles)
+    centre, dot = _START + [_RADIUS, 0.0], Shape("cylinder", np.array([0.015, 0.004]))
+    ways = (np.array([np.cos(a), np.sin(a)]) for a in np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))
+    dots = (
+        SceneObject(f"asked_{k}", dot, np.array([*(centre + _RADIUS * way), 0.002]), rgba=_BASE, ghost=True)
+        for k, way in enumerate(ways)
     )
     ball = SceneObject("held", Shape("sphere", np.array([0.03])), np.array(_HELD), rgba=_HAND, ghost=True)
-    return PaperCase(
-        name="c",
-        title="C: the operator drives the base in a circle; the hand stays at a point",
-        scene=Scene(
-            (*dots, ball), Viewpoint(position=(-0.7, -3.0, 2.6), target=(0.6, 0.35, 0.45), fovy=38.0)
-        ),
-        q=np.array([*_START, 0.0, *_AHEAD]),
-        seconds=26.0,
-        channels=("base.vx", "base.vy", "base.wz"),
-        command=_circle,
-        frames=Frames(base="world"),
-        held=_HELD,
-    )
+    view = Viewpoint(position=(-0.7, -3.0, 2.6), target=(0.6, 0.35, 0.45), fovy=38.0)
+    title = "C: the operator drives the base in a circle; the hand stays at a point"
+    q, frames = np.array([*_START, 0.0, *_AHEAD]), Frames(base="world")
+    return PaperCase("c", title, Scene((*dots, ball), view), q, 26.0, _OF_BASE, _circle, frames, _HELD)
+
+
+def _forward(time: float, end: float) -> FloatArray:
+    """Return 0.2 m/s ahead, ramped at both ends, (3,)."""
+    return np.array([0.2 * _ramp(time, end), 0.0, 0.0])
 
 
 def _circle(time: float, end: float) -> FloatArray:
@@ -150,6 +106,5 @@ def _ramped_time(time: float, end: float) -> float:
 def _line(name: str, start: tuple[float, ...], end: tuple[float, ...], rgba: Colour) -> SceneObject:
     """Return a thin line along x that nothing touches: where the command leads."""
     middle = 0.5 * (np.array(start) + np.array(end))
-    length = float(np.linalg.norm(np.subtract(end, start)))
-    shape = Shape("capsule", np.array([0.006, length]))
+    shape = Shape("capsule", np.array([0.006, float(np.linalg.norm(np.subtract(end, start)))]))
     return SceneObject(name, shape, middle, matrix_from_rpy([0.0, np.pi / 2, 0.0]), rgba=rgba, ghost=True)

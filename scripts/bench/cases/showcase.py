@@ -1,6 +1,6 @@
 """The showcase: the paper's three cases with one controller; a video, a figure and the figures as JSON."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -117,7 +117,7 @@ def run_case(
         pairs=collision.pairs,
         own_margin=collision.largest_margin < mpc.settings.margin,
         distances=collision.values(q),
-        solve_times=np.array(observer.solve_times),
+        solve_times=observer.solve_times,
         outcome=outcome,
     )
 
@@ -155,12 +155,12 @@ class _Observer:
         self.solve_times: list[float] = []
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
-        self._env = env
+        self._plant = env.plant
         for objective, values in parameters(self._case).items():
             self._mpc.set_parameters(objective, values)
 
     def see(self, frame: Frame) -> None:
-        self.states.append(self._env.state())
+        self.states.append(self._plant.state())
         self.solve_times.append(frame.diagnostics.solve_time)
 
 
@@ -169,26 +169,25 @@ def main(config: ShowcaseConfig) -> int:
     console = Terminal()
     console.print(f"Running case {config.case.upper()} …")
     result = showcase(config)
-    for line in _lines(result):
-        console.print(line)
+    console.print(*_lines(result), sep="\n")
     if result["video"].startswith("none: ") and config.video:
         console.print(f"Without a video: {result['video'].removeprefix('none: ')}")
     console.print(f"Written: {config.folder}/{config.case}.*")
     return 0
 
 
-def _lines(result: dict[str, Any]) -> list[str]:
+def _lines(result: dict[str, Any]) -> Iterator[str]:
     tracking, nearest, solve = result["tracking"], result["smallest_distance"], result["solve_time_ms"]
-    lines = [
-        result["title"],
+    yield result["title"]
+    yield (
         f"tracking error   {tracking['share']:.2%} of {tracking['cruising_speed']:.2f} m/s in the mean, "
-        f"{1e3 * tracking['max']:.1f} mm/s at most",
+        f"{1e3 * tracking['max']:.1f} mm/s at most"
+    )
+    yield (
         f"nearest          {nearest['value']:.3f} m ({' – '.join(nearest['pair'])}), "
-        f"contacts {result['contacts']}, brakes {result['brakes']}",
-        f"update           {solve['median']:.2f} ms median, {solve['p99']:.2f} ms p99",
-    ]
+        f"contacts {result['contacts']}, brakes {result['brakes']}"
+    )
+    yield f"update           {solve['median']:.2f} ms median, {solve['p99']:.2f} ms p99"
     if "hold" in result:
-        hold = result["hold"]
-        mean, most = 1e3 * hold["mean"], 1e3 * hold["max"]
-        lines.append(f"hand held        {mean:.1f} mm off in the mean, {most:.1f} mm at most")
-    return lines
+        mean, most = (1e3 * result["hold"][name] for name in ("mean", "max"))
+        yield f"hand held        {mean:.1f} mm off in the mean, {most:.1f} mm at most"

@@ -8,37 +8,24 @@ import numpy as np
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.scripts.bench.cases.cases import PaperCase
+from handrail.scripts.bench.report import spread
 
 
 @dataclass(frozen=True)
 class CaseTrace:
-    """What happened, after each of the T control periods.
-
-    Attributes:
-        case: which.
-        times: [s], (T,).
-        q: positions, (T, n).
-        asked: what the operator asks for at these times on the commanded channels, (T, c).
-        realised: measured on these channels, (T, c).
-        hand: position of the tool [m], (T, 3).
-        pairs: names of the pairs that keep apart, (P,).
-        own_margin: which of them keep a smaller margin than the controller's, (P,).
-        distances: signed [m], (T, P).
-        solve_times: of the updates [s], (T,).
-        outcome: of the session.
-    """
+    """What happened, after each of the T control periods."""
 
     case: PaperCase
-    times: FloatArray
-    q: FloatArray
-    asked: FloatArray
-    realised: FloatArray
-    hand: FloatArray
-    pairs: tuple[tuple[str, str], ...]
-    own_margin: BoolArray
-    distances: FloatArray
-    solve_times: FloatArray
-    outcome: Outcome
+    times: FloatArray  # [s], (T,)
+    q: FloatArray  # positions, (T, n)
+    asked: FloatArray  # what the operator asks for at these times on the commanded channels, (T, c)
+    realised: FloatArray  # measured on these channels, (T, c)
+    hand: FloatArray  # position of the tool [m], (T, 3)
+    pairs: tuple[tuple[str, str], ...]  # names of the pairs that keep apart, (P,)
+    own_margin: BoolArray  # which of them keep a smaller margin than the controller's, (P,)
+    distances: FloatArray  # signed [m], (T, P)
+    solve_times: list[float]  # of the updates [s], (T,)
+    outcome: Outcome  # of the session
 
     @property
     def tracking_error(self) -> FloatArray:
@@ -61,7 +48,6 @@ class CaseTrace:
         `tracking` is the error at every moment, from the start on; `share` is its mean over the cruise.
         """
         error, every = self.tracking_error, np.ones(len(self.pairs), dtype=bool)
-        times = np.percentile(1e3 * self.solve_times, (50, 95, 99, 100)).tolist()
         result = {
             "case": self.case.name,
             "title": self.case.title,
@@ -77,7 +63,7 @@ class CaseTrace:
             },
             "smallest_distance": self._closest(every),
             "smallest_distance_at_full_margin": self._closest(~self.own_margin),
-            "solve_time_ms": dict(zip(("median", "p95", "p99", "worst"), times, strict=True)),
+            "solve_time_ms": spread(self.solve_times, ("median", "p95", "p99", "worst")),
         }
         return result | ({"hold": _mean_and_max(self.held_error)} if self.case.held else {})
 
