@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.collect.cockpit.messages import LARGEST, Drive, parse
+from handrail.collect.cockpit.messages import LARGEST, CardAnswer, Drive, parse
 from handrail.collect.operators.person.inputs import Ask, Input
 from handrail.controllers.errors import HandrailError
 
@@ -25,6 +25,15 @@ GOOD |= {"view": 0.3, "targets": [3.0]}
 
 def said(**changes):
     return json.dumps({**GOOD, **changes})
+
+
+def answer(**changes):
+    return json.dumps({"kind": "answer", "card": "ee/tlx", "item": "mental", "value": 45} | changes)
+
+
+@pytest.mark.parametrize("value", [45, 4.5, "a text\nof two lines", True, None, ""])
+def test_an_answer_is_one_value(value):
+    assert parse(answer(value=value)) == CardAnswer("ee/tlx", "mental", value)
 
 
 def test_a_drive_and_an_ask():
@@ -49,6 +58,8 @@ def test_a_drive_and_an_ask():
         said(on=1), said(device="mouse"), said(device=[]), said(view=1e9), said(grip=None), said(extra=1),
         said(targets=[100.0]), said(targets=None), said(device="\ud800"), said(echo=10**400),
         said(axes=[10**400]), said(view="\ud800"),
+        answer(value=[]), answer(value={}), answer(value=float("nan")), answer(value=1e12),
+        answer(value=2**70), answer(card=3), answer(item=None), answer(item="x" * 300), answer(more=1), answer(value="x" * 5000),
         " " * (LARGEST + 1),
     ],
 )  # fmt: skip
