@@ -59,7 +59,8 @@ def test_a_drive_and_an_ask():
         said(targets=[100.0]), said(targets=None), said(device="\ud800"), said(echo=10**400),
         said(axes=[10**400]), said(view="\ud800"),
         answer(value=[]), answer(value={}), answer(value=float("nan")), answer(value=1e12),
-        answer(value=2**70), answer(card=3), answer(item=None), answer(item="x" * 300), answer(more=1), answer(value="x" * 5000),
+        answer(value=2**70), answer(card=3), answer(item=None), answer(item="x" * 300), answer(more=1),
+        answer(value="x" * 5000),
         " " * (LARGEST + 1),
     ],
 )  # fmt: skip

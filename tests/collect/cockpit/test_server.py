@@ -149,15 +149,6 @@ def test_a_copy_of_the_tab_takes_its_place(served):
         assert heard(served, {DRIVE})
 
 
-@pytest.mark.slow
-def test_the_lease_is_free_again_some_seconds_after_its_page_went(served):
-    with page(served, "page-number-two") as second:
-        with page(served, "page-number-one-b"):
-            pass
-        while not told(second, "you")["driving"]:
-            second.send(json.dumps({"kind": "ask", "what": "take", "value": True}))
-
-
 def test_what_was_dropped_is_told(served):
     with page(served, "page-number-one") as socket:
         told(socket, "stage")

@@ -4,7 +4,6 @@ import json
 import subprocess
 import sys
 from contextlib import contextmanager
-from itertools import combinations
 
 import pytest
 from command_helpers import command
@@ -15,10 +14,10 @@ from participant_driver import REMARK, ParticipantDriver
 from playwright.sync_api import expect
 
 from handrail.collect.user_study.design import DEMO_NOTE
+from handrail.collect.user_study.questionnaires import PAIRS, sus_score, tlx_raw, tlx_weighted
 
 pytestmark = pytest.mark.slow
 MODES, TASKS = ("ee", "base+ee", "direct"), ("reach", "pick_place")
-SCALES = ("mental", "physical", "temporal", "performance", "effort", "frustration")
 QUESTIONS = """
 [[questions]]
 name = "age"
@@ -83,20 +82,12 @@ def reloaded(page, root):
     return driver.answers, before.trials + driver.trials
 
 
-def by_hand(answers, mode):
-    """Return the scores of a participant's answers, computed as on paper."""
+def computed(answers, mode):
+    """Return the scores of a participant's answers."""
     scales, pairs = answers[f"{mode}/tlx"], answers[f"{mode}/tlx_pairs"]
-    assert len(pairs) == 15
-    assert set(pairs) == {f"{a}_{b}" for a, b in combinations(SCALES, 2)}
-    weights = {name: sum(winner == name for winner in pairs.values()) for name in SCALES}
-    sus = answers[f"{mode}/sus"]
-    known = None not in scales.values()
-    odd, even = ([sus[f"q{number}"] for number in range(first, 11, 2)] for first in (1, 2))
-    return {
-        "tlx_raw": sum(scales.values()) / 6 if known else None,
-        "tlx_weighted": sum(scales[name] * weights[name] for name in SCALES) / 15 if known else None,
-        "sus": None if None in odd + even else 2.5 * (sum(odd) - 5 + 25 - sum(even)),
-    }
+    assert set(pairs) == {"_".join(pair) for pair in PAIRS}
+    sus = sus_score(answers[f"{mode}/sus"])
+    return {"tlx_raw": tlx_raw(scales), "tlx_weighted": tlx_weighted(scales, pairs), "sus": sus}
 
 
 def test_a_study_of_two_through_the_page_killed_and_resumed(new_page, tmp_path):
@@ -114,8 +105,8 @@ def test_a_study_of_two_through_the_page_killed_and_resumed(new_page, tmp_path):
     }
     assert all(set(table["source"]) == {DEMO_NOTE} for table in tables.values())
     for row in tables["scores"].itertuples():
-        hand = by_hand(said[row.participant], row.condition)[row.score]
-        assert pandas.isna(row.value) if hand is None else row.value == pytest.approx(hand), row
+        score = computed(said[row.participant], row.condition)[row.score]
+        assert pandas.isna(row.value) if score is None else row.value == pytest.approx(score), row
     assert len(tables["scores"]) == 2 * 3 * 3
     assert tables["scores"]["value"].notna().any()
     assert tables["scores"]["value"].isna().any()  # P002 declined two questions
