@@ -8,7 +8,6 @@ import io
 import json
 import math
 import time
-import webbrowser
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
@@ -35,14 +34,14 @@ from handrail.collect.cockpit.pipe import (
     STILL,
     STOP,
 )
-from handrail.collect.cockpit.process import ServerProcess
+from handrail.collect.cockpit.process import ServerProcess, open_server
 from handrail.collect.cockpit.snapshot import Snapshots
 from handrail.collect.cockpit.strain import Strain
 from handrail.collect.config import RecordConfig
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Input
-from handrail.collect.operators.person.person import Person, Phase
+from handrail.collect.operators.person.person import Person
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
@@ -69,6 +68,9 @@ class Cockpit:
         wanted: how many episodes; 0 where nobody said.
         next: what one can do with them afterwards, a command a line.
         say: is told at the end what was dropped.
+
+    Attributes:
+        person: whoever steers.
     """
 
     def __init__(
@@ -85,7 +87,7 @@ class Cockpit:
     ) -> None:
         self._model, self._server, self._say = model, server, say
         self._refuses, self._folder, self._wanted, self._next = refuses, folder, wanted, next
-        self._episodes, self._person = EpisodeList(server), Person(model, modes, first)
+        self._episodes, self.person = EpisodeList(server), Person(model, modes, first)
         self._disk = DiskRoom(Path(folder).absolute()) if folder else None
         self._strain = Strain()
         Image.preinit()  # else the first picture of an episode waits for that
@@ -96,16 +98,7 @@ class Cockpit:
     @property
     def practises(self) -> bool:
         """Whether the episode is not to be saved."""
-        return self._person.practises
-
-    @property
-    def is_stopped(self) -> bool:
-        """Whether somebody has pressed STOP, and nobody has released it."""
-        return self._person.phase is Phase.STOPPED
-
-    def practise(self, practises: bool) -> None:
-        """Say whether the episodes to come are practice, not to be saved."""
-        self._person.practises = practises
+        return self.person.practises
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Show the scene of a new episode."""
@@ -116,7 +109,7 @@ class Cockpit:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
-        self._person.reset(view, rng)
+        self.person.reset(view, rng)
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode; let the page have this moment."""
@@ -124,8 +117,8 @@ class Cockpit:
         if now < self._acted + 1.0:  # else an undo, or a new episode
             self._strain.note(now - self._acted - self._env.period)
         self._listen()
-        answer = self._person.act(view)
-        moment = self._snapshots.now(view, self._person, now) | {
+        answer = self.person.act(view)
+        moment = self._snapshots.now(view, self.person, now) | {
             "saved": self._episodes.saved,
             "succeeded": self._episodes.succeeded,
             "commanded": round(self._acted + self._delay, 4) if self._delay else 0.0,
@@ -177,9 +170,9 @@ class Cockpit:
         """Take what the server has passed on."""
         for kind, data in self._server.receive():
             if kind == LOST:
-                self._person.lose()
+                self.person.lose()
             elif kind == STOP:
-                self._person.ask(Ask("stop"))
+                self.person.ask(Ask("stop"))
             elif kind == NOTE:
                 self._send_stage()
             elif kind == DROPPED:
@@ -187,16 +180,16 @@ class Cockpit:
             elif kind == DRIVE:
                 said = json.loads(data)
                 inputs = msgspec.convert(said["inputs"], Input)
-                self._person.take(inputs, said["received"], said["round_trip"])
+                self.person.take(inputs, said["received"], said["round_trip"])
             elif kind in (ASK, STILL):
                 said = json.loads(data)
                 value = tuple(said["value"]) if isinstance(said["value"], list) else said["value"]
                 if said["what"] not in self._refuses:
-                    self._person.ask(Ask(said["what"], value))
+                    self.person.ask(Ask(said["what"], value))
 
     def _send_stage(self) -> None:
         """Say what there is to draw and to choose from."""
-        env, robot, person = self._env, self._model.description, self._person
+        env, robot, person = self._env, self._model.description, self.person
         compiled, channels = env.simulation.mujoco_model, person.meaning.channels
         digest, data = stage.meshes(compiled)
         self._server.keep(f"{digest}.bin", data)
@@ -233,12 +226,9 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     """Return the cockpit of a recording, and say where it is."""
     check_installed()
     modes = build_modes(config, env)
-    server = ServerProcess(config.cockpit, say)
+    server = open_server(config.cockpit, say)
     folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
-    say(f"Drive at {server.address}")
     say(f"Episodes go to {folder}. To end: End recording on the page, or Ctrl-C here.")
-    if config.cockpit.opens:
-        webbrowser.open(server.address)
     then = [
         f"handrail-inspect {folder}",
         f"handrail-replay {folder}",

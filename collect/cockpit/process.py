@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import webbrowser
 from collections import deque
 from collections.abc import Callable, Collection
 from contextlib import suppress
@@ -151,3 +152,12 @@ class ServerProcess:
             for kind, data in self.pipe.receive():
                 if kind == NOTE:
                     self._take(data)
+
+
+def open_server(config: CockpitConfig, say: Callable[[str], None]) -> ServerProcess:
+    """Return a server; say where its page is, and open it where the settings want that."""
+    server = ServerProcess(config, say)
+    say(f"Drive at {server.address}")
+    if config.opens:
+        webbrowser.open(server.address)
+    return server

@@ -21,14 +21,11 @@ _DIGITS = 4  # of a pose: a tenth of a millimetre
 
 
 def shapes(model: MjModel) -> dict[str, Any]:
-    """Return the visible geoms of a model: on which body and where, what shape, what colour, which mesh."""
+    """Return the visible geoms of a model (body, place, shape, colour, mesh), and where each mesh begins."""
     geoms = []
     for index in np.flatnonzero(model.geom_group == VISIBLE_GROUP).tolist():
-        kind = _KINDS.get(mujoco.mjtGeom(model.geom_type[index]))
-        if kind is None:
-            continue
-        geoms.append(
-            {
+        if kind := _KINDS.get(mujoco.mjtGeom(model.geom_type[index])):
+            geom = {
                 "body": int(model.geom_bodyid[index]),
                 "at": _rounded(np.concatenate([model.geom_pos[index], model.geom_quat[index]])),
                 "kind": kind,
@@ -36,9 +33,11 @@ def shapes(model: MjModel) -> dict[str, Any]:
                 "rgba": _rounded(model.geom_rgba[index]),
                 "mesh": int(model.geom_dataid[index]),
             }
-        )
+            geoms.append(geom)
     names = [model.body(index).name for index in range(model.nbody)]
-    return {"bodies": names, "geoms": geoms, "meshes": _table(model)}
+    rows = [model.mesh_vertadr, model.mesh_vertnum, model.mesh_faceadr, model.mesh_facenum]
+    table = {"rows": np.stack(rows, axis=1).tolist(), "vertices": len(model.mesh_vert)}
+    return {"bodies": names, "geoms": geoms, "meshes": table}
 
 
 def hand(model: MjModel) -> list[int]:
@@ -64,12 +63,6 @@ def meshes(model: MjModel) -> tuple[str, bytes]:
 def poses(data: MjData) -> list[float]:
     """Return where every body is: position [m] and quaternion (wxyz), one after the other."""
     return _rounded(np.hstack([data.xpos, data.xquat]).ravel())
-
-
-def _table(model: MjModel) -> dict[str, Any]:
-    """Return where each mesh begins and how long it is: vertices, faces."""
-    rows = [model.mesh_vertadr, model.mesh_vertnum, model.mesh_faceadr, model.mesh_facenum]
-    return {"rows": np.stack(rows, axis=1).tolist(), "vertices": len(model.mesh_vert)}
 
 
 def _rounded(values: FloatArray) -> list[float]:

@@ -5,12 +5,11 @@ button: after success, failure or throwing it away comes another scene, after be
 While they do not steer, the robot brakes and time stands still. LeRobot's own keys save and repeat episodes.
 """
 
-import webbrowser
 from dataclasses import fields, replace
 from typing import Any
 
 from handrail.collect.cockpit.cockpit import Cockpit, check_installed
-from handrail.collect.cockpit.process import ServerProcess
+from handrail.collect.cockpit.process import open_server
 from handrail.collect.config import RecordConfig, SessionConfig
 from handrail.collect.devices.open_devices import open_device
 from handrail.collect.lerobot.configs import HandrailCockpitConfig, HandrailGamepadConfig
@@ -44,10 +43,7 @@ class HandrailCockpit(SimTeleoperator):
         check_installed()
         robot.env.render_mode = "rgb_array"  # from the next episode on the robot looks as it does
         say = Terminal().print
-        self._server = ServerProcess(self._settings, say)
-        say(f"Drive at {self.address}")
-        if self._settings.opens:
-            webbrowser.open(self.address)
+        self._server = open_server(self._settings, say)
         mode = robot.mode
         return Cockpit(robot.env.model, {mode.name: mode}, mode.name, self._server, refuses=_REFUSED, say=say)
 

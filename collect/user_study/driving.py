@@ -7,6 +7,7 @@ from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.pipe import STOP
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
+from handrail.collect.operators.person.person import Phase
 from handrail.collect.session.build import build_env, build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.user_study.design import ALLOWED
@@ -54,7 +55,7 @@ class Driving:
         writer = self._open.enter_context(closing(open_writer(config, env)))
         modes, channels = build_modes(config, env), Channels.of(env.model.description)
         offered = study.modes if "mode" in study.allow else (mode,)
-        if self._cockpit and self._cockpit.is_stopped:
+        if self._cockpit and self._cockpit.person.phase is Phase.STOPPED:
             self._server.unread.append((STOP, b""))  # a STOP holds until somebody releases it
         refuses = frozenset(ALLOWED) - frozenset(study.allow) | {"practice"}
         self._cockpit = Cockpit(
@@ -71,6 +72,6 @@ class Driving:
         """Run a trial, or one of practice, and return how it went."""
         assert self._cockpit
         assert self._recording
-        self._cockpit.practise(step.kind == "practice")
+        self._cockpit.person.practises = step.kind == "practice"
         self._recording.columns |= {"participant": self._name, "trial": step.trial}
         return self._recording.episode(seed, self._interrupts)

@@ -1,11 +1,10 @@
 """The verbs of `handrail-user-study`."""
 
 import time
-import webbrowser
 from collections.abc import Callable
 
 from handrail.collect.cockpit.cards import Cards
-from handrail.collect.cockpit.process import ServerProcess
+from handrail.collect.cockpit.process import open_server
 from handrail.collect.user_study.conduct import Conductor, Ending
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.driving import Driving
@@ -79,11 +78,8 @@ def _run(config: StudySessionConfig, folder: StudyFolder, say: Callable[[str], N
     folder.freeze()
     if folder.study.demo:
         say(folder.study.source)
-    server = ServerProcess(config.cockpit)
+    server = open_server(config.cockpit, say)
     try:
-        say(f"Drive at {server.address}")
-        if config.cockpit.opens:
-            webbrowser.open(server.address)
         with Interrupts() as interrupts, Driving(folder, who.name, server, interrupts) as driving:
             ending = Conductor(folder, who, Cards(server), driving, say).run()
             time.sleep(_FAREWELL)
