@@ -43,14 +43,14 @@ BENCHES = {
         "goal_reaching.config:BenchmarkConfig",
         "goal_reaching.benchmark:main",
     ),
-    "cases": Bench("the paper's cases A, B and C", "cases.config:ShowcaseConfig", "cases.showcase:main"),
+    "cases": Bench("the paper's cases A, B and C", "cases.showcase:ShowcaseConfig", "cases.showcase:main"),
     "speed": Bench(
         "the controller's update against IPOPT and mink, its QP solver against DAQP and PIQP",
         "speed.config:ProfileConfig",
         "speed.profiling:main",
     ),
     "operators": Bench(
-        "scripted operators in every task and mode", "operators.config:TrialsConfig", "operators.trials:main"
+        "scripted operators in every task and mode", "operators.file:TrialsConfig", "operators.trials:main"
     ),
     "rl": Bench(
         "trains the reinforcement-learning baseline (SAC)", "rl.config:TrainRlConfig", "rl.train:main"

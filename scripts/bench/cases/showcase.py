@@ -1,11 +1,13 @@
 """The showcase: the paper's three cases with one controller; a video, a figure and the figures as JSON."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 
 from handrail.collect.operators.operator import View
 from handrail.collect.session.film import SIZE, Filmer
@@ -15,6 +17,7 @@ from handrail.collect.world.gl import graphics_trouble
 from handrail.collect.world.task import FixedTask, Start, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
@@ -31,9 +34,41 @@ from handrail.datasets.recording.frames import Frame
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import write_json
 from handrail.scripts.bench.cases.cases import PaperCase, cases
-from handrail.scripts.bench.cases.config import ShowcaseConfig
 from handrail.scripts.bench.cases.figure import case_figure
 from handrail.scripts.bench.cases.trace import CaseTrace
+
+CASES = ("a", "b", "c")
+
+
+@dataclass(frozen=True)
+class ShowcaseConfig:
+    """Run one of the paper's three cases: a: steer the hand; b: steer the base; c: circle, the hand held."""
+
+    case: tyro.conf.Positional[str]
+    """Which: a, b or c."""
+    output: str = "outputs/showcase"
+    """Folder for the video, the figure and the JSON."""
+    seconds: float = 0.0
+    """How long [s]; the case's own length when 0."""
+    video: bool = True
+    """Whether to make the video (needs OpenGL)."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder to write to."""
+        return Path(self.output).expanduser()
+
+    def check(self) -> None:
+        """Check what can be checked without loading anything heavy."""
+        if self.case not in CASES:
+            raise unknown_name("case", self.case, CASES)
+        if self.seconds != 0 and not 0.5 <= self.seconds <= 120.0:
+            raise HandrailError(
+                f"--seconds {self.seconds}: expected 0.5 to 120, or 0 for the case's own length"
+            )
+        if self.folder.exists() and not self.folder.is_dir():
+            raise HandrailError(f"--output {self.output}: expected a folder, found a file")
+
 
 FPS = 20
 _WINDOW, _FADE = 0.2, 1.0  # of the intent's prediction [s]

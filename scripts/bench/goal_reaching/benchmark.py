@@ -14,11 +14,10 @@ from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import write_json
 from handrail.scripts.bench.goal_reaching.catalogue import BASELINES, Baseline
 from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
-from handrail.scripts.bench.goal_reaching.figures import CAPTIONS, figures
-from handrail.scripts.bench.goal_reaching.results import measures_by_goal, summarise
+from handrail.scripts.bench.goal_reaching.figures import CAPTIONS, Example, figures
+from handrail.scripts.bench.goal_reaching.metrics import measures_by_goal, summarise
 from handrail.scripts.bench.goal_reaching.run import available, goals, run, trace_of
 from handrail.scripts.bench.goal_reaching.tables import benchmark_tables
-from handrail.scripts.bench.goal_reaching.video import Example
 from handrail.scripts.bench.report import command_line, report
 
 _CONDITIONS = (

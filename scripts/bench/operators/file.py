@@ -1,16 +1,70 @@
-"""The file that trials write, `handrail.trials/1`: one line an episode, there whole after each."""
+"""Settings of the bench `operators`, and the file of its trials: one line an episode, whole after each."""
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from msgspec import Meta
+
+from handrail.collect.execution.config import ExecutionConfig
+from handrail.collect.flags import check_names, check_page, names
+from handrail.collect.operators.modes import MODES
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import AtLeastOne, Count, check_settings
 from handrail.controllers.versions import SIMULATION, versions
+from handrail.datasets.lists import Names
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import read_json
-from handrail.scripts.bench.operators.config import TrialsConfig
+from handrail.scripts.bench.report import ReportConfig
+
+SLOW_MODE = "direct_single"  # needs more time than the tasks give
+SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.0}  # [s]
+
+
+@dataclass(frozen=True)
+class TrialsConfig(ReportConfig, ExecutionConfig):
+    """Let the scripted operators do every task in every mode, and count how it went."""
+
+    tasks: Names = "all"
+    """Which tasks, or all: drawer, pick_place, reach, tray."""
+    modes: Names = "ee,switching,base+ee,direct,direct_single,leader,decoupled"
+    """Which teleop modes, or all."""
+    episodes: AtLeastOne = 20
+    """Episodes of each task in each mode; the same beginnings in all modes."""
+    persons: AtLeastOne = 5
+    """Scripted operators, who take turns episode by episode."""
+    noise: Annotated[float, Meta(ge=0, le=5)] = 1.0
+    """How human they are: 0 perfect, 1 the default, partly from studies of people."""
+    robot: str = "ridgeback_ur10"
+    """A robot that comes with Handrail, or a `.toml` file."""
+    seed: Count = 900
+    """Of scenes and operators."""
+    json: str = field(default="outputs/trials.json", kw_only=True)
+    """Every episode is added to this file at once; what it has already is not run again."""
+
+    @property
+    def task_names(self) -> tuple[str, ...]:
+        """The tasks asked for."""
+        return names(self.tasks, TASKS)
+
+    @property
+    def mode_names(self) -> tuple[str, ...]:
+        """The modes asked for."""
+        return names(self.modes, MODES)
+
+    def check(self) -> None:
+        """Check what can be checked without loading anything heavy."""
+        check_settings(self, "--")
+        check_names("task", "--tasks", self.task_names, TASKS)
+        check_names("mode", "--modes", self.mode_names, MODES)
+        if not self.json.endswith(".json"):
+            raise HandrailError(f"--json {self.json}: expected a file that ends in .json")
+        check_page(self.page)
+        self.check_execution()
+
 
 FORMAT = "handrail.trials/1"
 _PLACES = 4  # digits that are kept

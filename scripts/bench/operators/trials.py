@@ -22,8 +22,13 @@ from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
 from handrail.datasets.statistics.paired import wilson
-from handrail.scripts.bench.operators.config import SLOW_LIMITS, SLOW_MODE, TrialsConfig
-from handrail.scripts.bench.operators.file import OperatorTrial, TrialsFile
+from handrail.scripts.bench.operators.file import (
+    SLOW_LIMITS,
+    SLOW_MODE,
+    OperatorTrial,
+    TrialsConfig,
+    TrialsFile,
+)
 from handrail.scripts.bench.report import report
 
 _PRELOAD = ("handrail.scripts.bench.operators.trials",)

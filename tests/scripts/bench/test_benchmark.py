@@ -15,7 +15,7 @@ from rich.console import Console
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
-from handrail.scripts.bench.goal_reaching import video
+from handrail.scripts.bench.goal_reaching import figures as drawing
 from handrail.scripts.bench.goal_reaching.benchmark import benchmark, write_page
 from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
 from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
@@ -255,7 +255,7 @@ def test_wrong_input_is_one_clear_line(case):
 
 @pytest.mark.needs_gl
 def test_the_report_has_a_video(tmp_path, monkeypatch):
-    monkeypatch.setattr(video, "EVERY", 30)  # steps between pictures: ten times as few
+    monkeypatch.setattr(drawing, "EVERY", 30)  # steps between pictures: ten times as few
     config = replace(QUICK, goals=1, video=True, report=str(tmp_path / "report"))
     benchmark(config, BASELINES, QUIET)
     html = (tmp_path / "report" / "benchmark.html").read_text()

@@ -9,8 +9,14 @@ from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.robot.model import load_model
 from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
 from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
-from handrail.scripts.bench.goal_reaching.metrics import METRICS, Trace, arm_effort, jerkiness, measure
-from handrail.scripts.bench.goal_reaching.results import summarise
+from handrail.scripts.bench.goal_reaching.metrics import (
+    METRICS,
+    Trace,
+    arm_effort,
+    jerkiness,
+    measure,
+    summarise,
+)
 from handrail.scripts.bench.goal_reaching.tables import paired_table, profile_tables
 
 MODEL = load_model()

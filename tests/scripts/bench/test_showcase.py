@@ -12,9 +12,10 @@ from command_helpers import command
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.scripts.bench.cases.cases import cases
-from handrail.scripts.bench.cases.config import CASES, ShowcaseConfig
 from handrail.scripts.bench.cases.showcase import (
+    CASES,
     FPS,
+    ShowcaseConfig,
     build_controller,
     parameters,
     run_case,
