@@ -52,11 +52,11 @@ def test_corrections_are_intermittent():
     assert np.min(np.diff(times[moves])) >= 0.35 - 1e-9
 
 
-def test_letting_go_is_immediate():
-    times = PERIOD * np.arange(5)
-    wanted = np.array([[0.3, 0, 0]] * 2 + [[0.0, 0, 0]] * 3)
-    held = run(human(refractory=10.0), wanted, times)
-    np.testing.assert_array_equal(held[2:], 0.0)
+@pytest.mark.parametrize("numbers", [{"refractory": 10.0}, {"refractory": 1.0, "movement": 0.1}])
+def test_letting_go_is_immediate(numbers):
+    wanted = np.array([[0.3, 0, 0]] * 3 + [[0.0, 0, 0]] * 3)
+    held = run(human(**numbers), wanted, PERIOD * np.arange(6))
+    np.testing.assert_array_equal(held[3:], 0.0)
 
 
 def test_noise_grows_with_the_signal_and_rests_at_rest():
@@ -116,9 +116,3 @@ def test_the_hand_moves_along_minimum_jerk():
     np.testing.assert_allclose(moved[:, 0], [0.4 * minimum_jerk(time / 0.5) for time in times])
     shares = np.array([minimum_jerk(tau) for tau in np.linspace(0, 1, 1001)])
     assert np.max(np.diff(shares)) == pytest.approx(1.875e-3, rel=1e-3)  # peak speed 15/8 of the mean
-
-
-def test_letting_go_needs_no_movement():
-    times = 0.05 * np.arange(6)
-    wanted = np.array([[0.3, 0, 0]] * 3 + [[0.0, 0, 0]] * 3)
-    np.testing.assert_array_equal(run(human(refractory=1.0, movement=0.1), wanted, times)[3:], 0.0)

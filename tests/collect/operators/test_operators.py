@@ -12,7 +12,6 @@ from handrail.collect.operators.scripted.hand import Perception
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.input_map import StickMap
 from handrail.collect.operators.scripted.placement import (
-    standing_point,
     standing_pose,
     standing_within_reach,
 )
@@ -131,12 +130,6 @@ def test_a_mode_speaks_only_on_its_channels(name, focus):
     assert np.all(np.abs(values) <= inputs.full)
 
 
-def test_switching_follows_the_focus():
-    inputs = sticks(MODES["switching"])
-    np.testing.assert_array_equal(inputs.mask("hand"), inputs.channels.mask("ee"))
-    np.testing.assert_array_equal(inputs.mask("base"), inputs.channels.mask("base"))
-
-
 def test_joint_inputs_move_the_hand_as_wished():
     inputs = sticks(MODES["direct"])
     velocities = inputs.wanted(motion_goal(), state())[1][inputs.channels.joint_slice]
@@ -173,12 +166,6 @@ def test_driving_is_in_the_base_frame():
     q[2] = np.pi / 2
     goal = np.array([q[0], q[1] + 5.0, np.pi / 2])  # straight ahead
     np.testing.assert_allclose(base_twist(q, goal, Gains()), [Gains().base_speed, 0, 0], atol=1e-12)
-
-
-def test_the_base_stands_where_the_place_is_in_reach():
-    place = np.array([0.5, 0.4, 0.7])
-    spot = standing_point(MODEL, place)
-    assert 0.8 < np.linalg.norm(place[:2] - spot[:2]) < 1.5
 
 
 def test_the_arm_is_solved_for_and_the_base_stays():

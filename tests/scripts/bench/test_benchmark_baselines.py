@@ -17,7 +17,7 @@ from handrail.scripts.bench.goal_reaching.baselines import (
     hand_intent,
     smoothed_hand_intent,
 )
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES, TAKE_UP
+from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
 from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.run import trace_of
 
@@ -42,17 +42,6 @@ def test_a_baseline_s_low_pass_is_the_mpc_s():
         sent = smooth(twist, STATE, time)
         np.testing.assert_allclose(sent.values, expected)
         assert (sent.time, sent.mask.tolist()) == (time, CHANNELS.mask("ee").tolist())
-
-
-def test_the_low_pass_takes_a_step_up_in_its_time_and_keeps_the_way():
-    steps, held = 600, 200
-    smooth = smoothed_hand_intent(MODEL)
-    sent = np.array([smooth(np.ones(6) * (k < held), STATE, k * STEP).values for k in range(steps)])
-    hand = sent[:, CHANNELS.tool_slice]
-    constants = np.array([TAKE_UP[0]] * 3 + [TAKE_UP[1]] * 3)
-    for k in (0, 20, 100):
-        np.testing.assert_allclose(hand[k], 1.0 - np.exp(-k * STEP / constants), atol=1e-9)
-    np.testing.assert_allclose(hand.sum(0), held, rtol=0.01)
 
 
 def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
