@@ -53,6 +53,18 @@ def _disks_at_rest():
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _errors_are_one_line():
+    """Whatever is refused in any test, is refused in one line."""
+    from handrail.controllers.errors import HandrailError
+
+    def checked(self: HandrailError, *words: object) -> None:
+        assert "\n" not in "".join(map(str, words)), words
+
+    with mock.patch.object(HandrailError, "__init__", checked):
+        yield
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("needs_gl") and graphics_trouble():
         pytest.skip(f"needs OpenGL: {graphics_trouble()}")

@@ -120,16 +120,6 @@ def test_moving_obstacles_are_where_they_will_be():
         collision.update_scene((Obstacle("ball", Shape("sphere", [0.2]), [1, 0, 0]),))
 
 
-def test_the_distance_to_a_wall_is_the_gap():
-    """The chassis is 0.48 m long ahead of its centre."""
-    wall = Obstacle("wall", Shape("box", [0.2, 4.0, 2.0]), [1.0, 0.0, 1.0])
-    collision = CollisionModel(MODEL, (wall,))
-    q = np.array(MODEL.description.home)
-    q[0] = -0.5
-    row = collision.pairs.index(("chassis", "wall"))
-    assert collision.values(q[None])[0, row] == pytest.approx(0.9 - (-0.5 + 0.48), abs=1e-6)
-
-
 def test_only_near_pairs_have_gradients():
     collision = CollisionModel(MODEL)
     home = np.tile(MODEL.description.home, (3, 1))

@@ -12,7 +12,6 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.prediction import Extrapolated, Smoothed
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.shape import Obstacle, Shape
 
 CHANNELS = Channels.of(MODEL.description)
@@ -72,14 +71,3 @@ def test_what_a_controller_asked_for_before_does_not_matter(build):
 
 def test_a_robot_that_says_nothing_moves_as_it_is_told():
     np.testing.assert_array_equal(State(HOME, 0.1 * HOME).commanded, 0.1 * HOME)
-
-
-def test_planar_vectors_turn_into_the_base_and_back():
-    """A quarter turn; columns at once; a turn and its inverse."""
-    np.testing.assert_allclose(turned([1.0, 0.0, 0.7], np.pi / 2), [0.0, 1.0, 0.7], atol=1e-15)
-    rng = np.random.default_rng(0)
-    many, angles = rng.normal(size=(3, 5)), rng.uniform(-np.pi, np.pi, 5)
-    columns = [turned(column, angle) for column, angle in zip(many.T, angles, strict=True)]
-    np.testing.assert_array_equal(turned(many, angles).T, columns)
-    np.testing.assert_allclose(turned(turned(many, angles), -angles), many)
-    np.testing.assert_allclose(turned(np.eye(3), 0.3) @ many, turned(many, 0.3))

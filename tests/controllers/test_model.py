@@ -11,6 +11,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.symbolic import symbolic_pose
@@ -62,61 +63,37 @@ def test_home_puts_the_tool_where_the_robot_has_it():
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("old", "new", "words"),
     [
-        (("q = [-1.5,", "q = ["), "home: q: expected 9 numbers, one a joint, got 8"),
-        (('kind = "planar"', 'kind = "legs"'), "base: kind: expected one of planar, fixed, got 'legs'"),
-        (('["chassis", "upper_arm"]', '["chassis", "tail"]'), "collision shape 'tail'"),
-        (("[gripper]", '[gripper]\nshape = "paw"'), "collision shape 'paw'"),
-        (
-            ("box = [0.960, 0.793, 0.28]", "box = [0.960, -1.0, 0.28]"),
-            "collision[0]: box: expected",
-        ),
-        (('urdf = "example', 'urdf = "no-such'), "URDF no-such-robot-data"),
-        (("[home]", "[home"), "not valid TOML"),
-        (('name = "ridgeback_ur10"', ""), "expected an entry 'name'"),
-        (("[home]", "[[home]]"), "home: expected a table"),
-        (("mass = 165.3", "mass = nan"), "base: mass: expected a number >= 1e-06, got nan"),
-        (("mass = 165.3", "mass = true"), "mass: expected a number"),
-        (("mass = 165.3", 'mass = "heavy"'), "mass: expected a number"),
-        (("mass = 165.3", "mas = 165.3"), "base: unknown entry 'mas'"),
-        (("velocity = [1.0,", "velocity = [inf,"), "limits: velocity: expected a number <= 1000000.0 at [0]"),
-        (("velocity = [1.0,", "velocity = [5e-324,"), "limits: velocity: expected a number >= 1e-06 at"),
-        (("acceleration = [1.0,", "acceleration = [0.0,"), "acceleration: expected a number >= 1e-06 at [0]"),
-        (("effort = [2000.0,", "effort = [-2000.0,"), "effort: expected a number >= 1e-06 at [0]"),
-        (("effort = [2000.0, ", "effort = ["), "effort: expected 9 numbers"),
-        (
-            ("position_lower = [-3.0,", "position_lower = [3.0,"),
-            "expected position_lower below position_upper",
-        ),
-        (("q = [-1.5,", "q = [-3.5,"), "home of joint x: expected -3.0 to 3.0, got -3.5"),
-        (("size = [0.960, 0.793]", "size = [0.960]"), "size: expected a list of length 2"),
-        (("rpy = [0.0, 0.0, -1.57", "rpy = [0.0, -1.57"), "rpy: expected a list of length 3"),
-        (("capsule = 0.08", "capsule = 0.08\nbox = [1.0, 1.0, 1.0]"), "got box and capsule"),
-        (("b = [0.27, 0.01, 0.63]", "b = [0.27, 0.01, 0.28]"), "expected a capsule from a to b, apart"),
-        (('name = "mount"', 'name = "chassis"'), "collision: expected each once, got 'chassis' twice"),
-        (('["chassis", "upper_arm"]', '["chassis"]'), "pairs: expected a list of"),
-        (('["chassis", "upper_arm"]', '["chassis", "elbow"]'), "pairs: expected each once"),
-        (("stroke = 0.090", "stroke = 0.0"), "gripper: stroke: expected a number >= 1e-06"),
-        (("stroke = 0.090", "strokes = 0.090"), "gripper: unknown entry 'strokes'"),
-        (('urdf = "example', 'urdf = "../example'), "expected a path inside a package, or beside"),
-        (('urdf = "example', 'urdf = "/example'), "expected a path inside a package, or beside"),
-        (('urdf = "example', 'urdf = "robot.urdf" #'), "URDF robot.urdf: expected it beside"),
-        (('urdf = "example', 'urdf = "" #'), "urdf: expected a text of length"),
-        (('urdf = "example', 'urdf = "." #'), "expected a path inside a package, or beside"),
-        (('"shoulder_pan_joint"', '"shoulder_lift_joint"'), "joints: expected each once"),
+        ("[home]", "[home", "not valid TOML"),
+        ('name = "ridgeback_ur10"', "", "expected an entry 'name'"),
+        ("mass = 165.3", "mas = 165.3", "base: unknown entry 'mas'"),
+        ("box = [0.960, 0.793, 0.28]", "box = [0.960, -1.0, 0.28]", "collision[0]: box: expected"),
+        ("acceleration = [1.0,", "acceleration = [0.0,", "acceleration: expected a number >= 1e-06 at [0]"),
+        ("q = [-1.5,", "q = [", "home: q: expected 9 numbers, one a joint, got 8"),
+        ("effort = [2000.0, ", "effort = [", "effort: expected 9 numbers"),
+        ("q = [-1.5,", "q = [-3.5,", "home of joint x: expected -3.0 to 3.0, got -3.5"),
+        ("lower = [-3.0,", "lower = [3.0,", "expected position_lower below position_upper"),
+        ("capsule = 0.08", "capsule = 0.08\nbox = [1.0, 1.0, 1.0]", "got box and capsule"),
+        ("b = [0.27, 0.01, 0.63]", "b = [0.27, 0.01, 0.28]", "expected a capsule from a to b, apart"),
+        ('["chassis", "upper_arm"]', '["chassis", "tail"]', "collision shape 'tail'"),
+        ('["chassis", "upper_arm"]', '["chassis", "elbow"]', "pairs: expected each once"),
+        ("[gripper]", '[gripper]\nshape = "paw"', "collision shape 'paw'"),
+        ('name = "mount"', 'name = "chassis"', "collision: expected each once, got 'chassis' twice"),
+        ('"shoulder_pan_joint"', '"shoulder_lift_joint"', "joints: expected each once"),
+        ('urdf = "example', 'urdf = "no-such', "URDF no-such-robot-data"),
+        ('urdf = "example', 'urdf = "robot.urdf" #', "URDF robot.urdf: expected it beside"),
+        ('urdf = "example', 'urdf = "" #', "urdf: expected a text of length"),
     ],
 )
-def test_a_wrong_description_says_what_is_wrong(tmp_path, change, words):
-    from handrail.controllers.robot.catalogue import ROBOTS
-
+def test_a_wrong_description_says_what_is_wrong(tmp_path, old, new, words):
+    """What types refuse in any file is tested once, in test_typed.py."""
     text = ROBOTS["ridgeback_ur10"].file.read_text()
-    assert change[0] in text
+    assert old in text
     path = tmp_path / "robot.toml"
-    path.write_text(text.replace(change[0], change[1], 1))
-    with pytest.raises(HandrailError, match=re.escape(words)) as error:
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(HandrailError, match=re.escape(words)):
         load_description(path)
-    assert "\n" not in str(error.value)
 
 
 def test_an_unknown_robot_lists_the_known():

@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -23,14 +24,11 @@ QUICK = settings(max_examples=50, suppress_health_check=[HealthCheck.function_sc
 
 
 def one_line_or_a_robot(path) -> None:
-    refusals = []
-    try:
+    """The line is one: conftest.py looks at every error."""
+    with suppress(HandrailError):
         model = RobotModel(load_description(path))
         CollisionModel(model, ())
         model.pose(model.description.home)
-    except HandrailError as error:
-        refusals.append(str(error))
-    assert "\n" not in "".join(refusals)
 
 
 @pytest.mark.parametrize("robot", robot_names())
@@ -63,9 +61,8 @@ def test_another_text_is_one_line(tmp_path, data):
 def test_what_is_no_description_is_one_line(content, tmp_path):
     path = tmp_path / "robot.toml"
     path.write_bytes(content)
-    with pytest.raises(HandrailError, match="robot description") as raised:
+    with pytest.raises(HandrailError, match="robot description"):
         load_description(path)
-    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize("name", ["floor", "finger_left", "cube"])
@@ -99,9 +96,8 @@ def test_a_urdf_lies_beside_the_description_and_is_one(tmp_path):
 
 @pytest.mark.parametrize("urdf", [".", "./", "..", "/etc/passwd", "a/../../b.urdf"])
 def test_a_urdf_elsewhere_is_one_line(urdf, tmp_path):
-    with pytest.raises(HandrailError, match="expected a path inside a package, or beside") as raised:
+    with pytest.raises(HandrailError, match="expected a path inside a package, or beside"):
         load_description(beside(tmp_path, urdf))
-    assert "\n" not in str(raised.value)
 
 
 def chain(links: int) -> str:
@@ -131,9 +127,8 @@ def test_a_urdf_that_is_none_or_that_pinocchio_cannot_stand_is_one_line(case, tm
     """Twenty thousand links overflow its stack, and end the process."""
     content, said = URDFS[case]
     (tmp_path / "arm.urdf").write_text(content)
-    with pytest.raises(HandrailError, match=said) as raised:
+    with pytest.raises(HandrailError, match=said):
         RobotModel(load_description(beside(tmp_path, "arm.urdf")))
-    assert "\n" not in str(raised.value)
 
 
 @pytest.fixture

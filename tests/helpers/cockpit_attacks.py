@@ -36,27 +36,26 @@ class Attacker:
         self.site = f"https://{parts.netloc.split('#')[0]}"
         self.rng = np.random.default_rng(0)
 
-    async def raw(self, data, wait=10.0):
-        """Send bytes; return the first line of what is said."""
-        try:
-            async with asyncio.timeout(wait):
-                reader, writer = await asyncio.open_connection(
-                    self.host, self.port, ssl=TRUSTING, local_addr=(FROM, 0)
-                )
-                writer.write(data)
-                await writer.drain()
-                line = await reader.readline()
-                writer.close()
-                return line.decode(errors="replace").strip()
-        except _REFUSED:
-            return ""
+    async def connected(self):
+        """Return a connection's reader and writer."""
+        async with asyncio.timeout(10.0):
+            return await asyncio.open_connection(self.host, self.port, ssl=TRUSTING, local_addr=(FROM, 0))
 
     async def request(self, method, path, body=b"", **headers):
-        """Return the answer's status line and its session."""
+        """Return the lines of the answer's head; the status is the first one, "" where nothing is said."""
         said = {"Host": f"{self.host}:{self.port}", "Origin": self.site} | headers
         lines = [f"{method} {path} HTTP/1.1", *(f"{name}: {value}" for name, value in said.items())]
         lines += [f"Content-Length: {len(body)}", "", ""]
-        return await self.raw("\r\n".join(lines).encode("latin1") + body)
+        try:
+            reader, writer = await self.connected()
+            writer.write("\r\n".join(lines).encode("latin1") + body)
+            async with asyncio.timeout(10.0):
+                await writer.drain()
+                head = await reader.readuntil(b"\r\n\r\n")
+            writer.close()
+            return head.decode(errors="replace").split("\r\n")
+        except _REFUSED:
+            return [""]
 
     def page(self, name, cookie, origin=""):
         """Return a page's connection."""
@@ -81,14 +80,7 @@ class Attacker:
 
     async def log_in(self):
         """Return a session of one who knows the token."""
-        body = self.token.encode()
-        reader, writer = await asyncio.open_connection(
-            self.host, self.port, ssl=TRUSTING, local_addr=(FROM, 0)
-        )
-        head = f"POST /login HTTP/1.1\r\nHost: {self.host}:{self.port}\r\nOrigin: {self.site}\r\n"
-        writer.write(head.encode() + f"Content-Length: {len(body)}\r\n\r\n".encode() + body)
-        lines = (await reader.readuntil(b"\r\n\r\n")).decode().split("\r\n")
-        writer.close()
+        lines = await self.request("POST", "/login", self.token.encode())
         return next(line.split(": ")[1].split(";")[0] for line in lines if line.startswith("set-cookie"))
 
     def nonsense(self):
@@ -123,10 +115,7 @@ class Attacker:
                     each = socket.create_connection((self.host, self.port), 10, source_address=(FROM, 0))
                     opened.append((None, each))
                 else:
-                    async with asyncio.timeout(10):
-                        pair = await asyncio.open_connection(
-                            self.host, self.port, ssl=TRUSTING, local_addr=(FROM, 0)
-                        )
+                    pair = await self.connected()
                     pair[1].write(b"GET / HTTP/1.1\r\nHost: 127.0.0.2\r\nX-Slow: ")
                     opened.append(pair)
         await asyncio.sleep(3.0)
@@ -136,29 +125,31 @@ class Attacker:
 
     async def all(self, stolen):
         """Do everything; return what came of it."""
-        said = {"no token": await self.request("GET", "/link.js")}
-        wrong = await asyncio.gather(
-            *(self.request("POST", "/login", b"wrong %d" % number) for number in range(60))
-        )
+
+        async def status(*what, **headers):
+            return (await self.request(*what, **headers))[0]
+
+        said = {"no token": await status("GET", "/link.js")}
+        wrong = await asyncio.gather(*(status("POST", "/login", b"wrong %d" % each) for each in range(60)))
         said["wrong tokens let in"] = sum(line.startswith("HTTP/1.1 200") for line in wrong)
-        said["the owner after that"] = await self.request("POST", "/login", self.token.encode())
+        said["the owner after that"] = await status("POST", "/login", self.token.encode())
         own = await self.log_in()
         said["foreign origin"] = await self.comes_in(own, "https://evil.example")
         said["another's session"] = await self.comes_in(stolen)
         said["no session"] = await self.comes_in()
-        said["a name made to point here"] = await self.request("GET", "/", Host="evil.example")
-        said["a long body"] = await self.request("POST", "/login", b"x" * 3_000_000)
-        said["a long head"] = await self.request("GET", "/", Cookie="x" * 3_000_000)
+        said["a name made to point here"] = await status("GET", "/", Host="evil.example")
+        said["a long body"] = await status("POST", "/login", b"x" * 3_000_000)
+        said["a long head"] = await status("GET", "/", Cookie="x" * 3_000_000)
         paths = ["/" + self.rng.bytes(30).hex()[: int(self.rng.integers(1, 60))] for _ in range(200)]
         paths += ["/%00", "/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/meshes/..%2f"]
-        found = [await self.request("GET", path, Cookie=own) for path in paths]
+        found = [await status("GET", path, Cookie=own) for path in paths]
         said["paths found"] = sum(line.startswith("HTTP/1.1 2") for line in found)
         said["paths that broke it"] = sum(line.startswith("HTTP/1.1 5") for line in found)
         async with self.page("page-that-reads-nothing", own, "") as deaf:
             said["messages"] = await self.fuzz(own)
             said["connections"] = await self.crowd()
             deaf.transport.abort()
-        said["the page after all that"] = await self.request("GET", "/")
+        said["the page after all that"] = await status("GET", "/")
         return said
 
 

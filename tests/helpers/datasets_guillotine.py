@@ -7,12 +7,13 @@ what a killed process would have left, files half written in the staging folder 
 
 import gc
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-CHANGES = ("os.rename", "os.link", "os.remove", "os.mkdir", "os.rmdir", "os.truncate")
+CHANGES = ("os.rename", "os.link", "os.symlink", "os.remove", "os.mkdir", "os.rmdir", "os.truncate")
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 
 
@@ -45,20 +46,34 @@ class Guillotine:
         return not self.dead
 
     def _audit(self, event: str, arguments: tuple) -> None:
-        if not self._root or not is_change(event, arguments) or not self._concerns(arguments):
+        if not self._root or not is_change(event, arguments, self._root):
             return
         self._left -= 1
         if self._left <= 0:
             self.dead = True
             raise Killed
 
-    def _concerns(self, arguments: tuple) -> bool:
-        paths = [os.fspath(path) for path in arguments[:2] if isinstance(path, str | os.PathLike)]
-        return any(path.startswith(self._root) for path in paths)
+
+def is_change(event: str, arguments: tuple, folder: str) -> bool:
+    """Return whether an event is a change to what lies at a path that begins so."""
+    if event not in CHANGES and not (event == "open" and bool((arguments[2] or 0) & WRITING)):
+        return False
+    paths = [os.fspath(path) for path in arguments[:2] if isinstance(path, str | os.PathLike)]
+    return any(path.startswith(folder) for path in paths)
 
 
-def is_change(event: str, arguments: tuple) -> bool:
-    return event in CHANGES or (event == "open" and bool((arguments[2] or 0) & WRITING))
+def kill_at(folder: str, k: int) -> list[str]:
+    """Kill this process, with SIGKILL, at its k-th change; return a list to which each change is added."""
+    changes: list[str] = []
+
+    def audit(event: str, arguments: tuple) -> None:
+        if is_change(event, arguments, folder):
+            changes.append(event)
+            if len(changes) == k:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    sys.addaudithook(audit)
+    return changes
 
 
 def tear_staged_files(root: Path) -> None:

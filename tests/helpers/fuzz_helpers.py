@@ -20,7 +20,6 @@ from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.reach import sample_movers
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.collision.slacks import MOVING
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
@@ -175,21 +174,6 @@ class OwnDistances:
         return min(near, default=np.inf)
 
 
-class _Around:
-    """Says how near things are, and when the movers turned round, to explain a contact."""
-
-    def __init__(self, model, scene):
-        self._scene, self._collision = scene, CollisionModel(model, scene.obstacles())
-
-    def told(self, state):
-        self._collision.update_scene(self._scene.obstacles(state.time))
-        distances = self._collision.values(state.q[None])[0]
-        still = distances[self._collision.kinds != MOVING].min()
-        since = [f"{state.time % (m.patrol.length / m.patrol.speed):.2f} s" for m in self._scene.movers]
-        turned = f", movers turned {', '.join(since)} before" if since else ""
-        return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m{turned}"
-
-
 def run(
     model: RobotModel, controller, seed: int, seconds: float, movers: int = 0, gap: float = PERIOD
 ) -> FuzzResult:
@@ -207,7 +191,6 @@ def run(
     scene, q = cluttered(model, movers, rng)
     simulation = Simulation(model, scene, q, PERIOD, gate=OpenGate(model, PERIOD))
     own = OwnDistances(model, simulation.mujoco_model)
-    around = _Around(model, scene)
     controller.reset(scene.obstacles(0.0))
     limits, result = model.description.limits, FuzzResult()
     rude = RudeOperator(controller.channels, limits, rng)
@@ -231,7 +214,7 @@ def run(
         for pair in simulation.contacts:
             met = set(pair.split(" – "))
             kind = result.moving if met & moving else result.standing if met & standing else result.own
-            kind.append(f"{pair} at {state.time:.2f} s: {around.told(state)}, {command.diagnostics.status}")
+            kind.append(f"{pair} at {state.time:.2f} s, {command.diagnostics.status}")
         if result.moving:
             break
         result.nearest_own = min(result.nearest_own, own.smallest(simulation.data))

@@ -1,6 +1,6 @@
 """A function in a process of its own that dies, as by SIGKILL, at its k-th change below a folder.
 
-A change is an `open` for writing, a rename, a removal, a link or a new folder. Processes are forked from a
+Processes are forked from a
 server that has loaded LeRobot and PyTorch once, as those of a study are.
 """
 
@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from datasets_guillotine import CHANGES, WRITING
+from datasets_guillotine import kill_at
 
 from handrail.scripts.__main__ import main
 
@@ -42,24 +42,13 @@ def run_command(name: str, *flags: object) -> None:
     main()
 
 
-def _call(folder: str, remaining: int, log: str, function: Callable[..., object], arguments: tuple) -> None:
+def _call(folder: str, change: int, log: str, function: Callable[..., object], arguments: tuple) -> None:
     with open(log, "w") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
 
-    def audit(event: str, arguments: tuple) -> None:
-        nonlocal remaining
-        opened = event == "open" and bool((arguments[2] or 0) & WRITING)
-        if not opened and event not in (*CHANGES, "os.symlink"):
-            return
-        places = [os.fspath(path) for path in arguments[:2] if isinstance(path, str | os.PathLike)]
-        if any(place.startswith(folder) for place in places):
-            remaining -= 1
-            if not remaining:
-                os.kill(os.getpid(), signal.SIGKILL)
-
     from handrail.policies.imitation.evaluation import evaluation
 
     evaluation._SAVE_EVERY = 0.0  # after every rollout, so that there is much to write
-    sys.addaudithook(audit)
+    kill_at(folder, change)
     function(*arguments)

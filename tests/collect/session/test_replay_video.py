@@ -3,17 +3,15 @@
 import av
 import numpy as np
 import pytest
+from canned import canned, record_by_command
 from command_helpers import command
 
 from handrail.datasets.reading.reader import read_episodes, read_info
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    root = tmp_path_factory.mktemp("recorded") / "reach"
-    done = command(root, "--task", "reach", "--dataset.num_episodes", 1, "--time_limit", 1)
-    assert done.returncode == 0, done.stderr
-    return root
+@pytest.fixture
+def recorded():
+    return canned(record_by_command, "--task reach --dataset.num_episodes 1 --time_limit 1")
 
 
 @pytest.mark.needs_gl

@@ -5,7 +5,8 @@ Datasets that people drive are judged where they are recorded: `test_recording.p
 """
 
 import pytest
-from command_helpers import command
+from canned import canned
+from command_helpers import ran
 from judges import doctor_fails, lint_defects
 
 from handrail.datasets.reading.reader import read_info
@@ -21,9 +22,7 @@ DATASETS = {
 
 def recorded(root, name):
     for words in DATASETS[name]:
-        done = command(*words.split(), "--dataset.root", root)
-        assert done.returncode == 0, done.stderr
-    return root
+        ran(*words.split(), "--dataset.root", root)
 
 
 @pytest.fixture(
@@ -32,8 +31,8 @@ def recorded(root, name):
         pytest.param(name, marks=[pytest.mark.needs_gl] if name == "cameras" else []) for name in DATASETS
     ],
 )
-def root(request, tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("judged") / "set", request.param)
+def root(request):
+    return canned(recorded, request.param)
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +47,7 @@ def edited(root):
         f"merge {new}_1 {new}_2 --output {new}",
     )
     for line in lines:
-        done = command(*line.split(), name="edit")
-        assert done.returncode == 0, done.stderr
+        ran(*line.split(), name="edit")
     return new
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from canned import canned, record_by_command
 from command_helpers import command
 
 from handrail.collect.commands import replay
@@ -41,13 +42,10 @@ def touching(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def masked(tmp_path_factory):
+def masked():
     """Two short episodes with a mask of one's own."""
-    root = tmp_path_factory.mktemp("masked") / "set"
     words = f"--task reach --mask {MASK} --time_limit 1 --dataset.num_episodes 2"
-    done = command(*words.split(), "--dataset.root", root)
-    assert done.returncode == 0, done.stderr
-    return root
+    return canned(record_by_command, words)
 
 
 def test_contacts_are_those_that_began_in_record_replay_and_inspect(touching):

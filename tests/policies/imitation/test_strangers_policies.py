@@ -7,6 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
+from canned import copied
 from command_helpers import command
 from policy_helpers import untrained_act
 from safetensors.numpy import load_file, save_file
@@ -25,15 +26,10 @@ MARKER = "marker"
 DEEP = "[" * 200_000
 
 
-@pytest.fixture(scope="module")
-def honest(tmp_path_factory):
-    return untrained_act(tmp_path_factory.mktemp("honest") / "policy", "realised")
-
-
 @pytest.fixture
-def policy(honest, tmp_path):
+def policy(tmp_path):
     """A folder of a policy's own, for an attack."""
-    return shutil.copytree(honest, tmp_path / "stranger")
+    return copied(tmp_path / "stranger", untrained_act, "realised")
 
 
 def change(file, **entries):

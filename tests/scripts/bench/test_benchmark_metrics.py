@@ -103,18 +103,6 @@ def test_a_summary_is_over_the_episodes_and_pairs_are_by_goal():
     assert len(results["episodes"]) == 6
 
 
-def test_what_an_update_costs_is_compared_on_the_same_goals():
-    rows = [row(goal, "mpc", update_ms_median=0.5 + goal) for goal in (0, 1, 2)]
-    rows += [row(goal, "dls", update_ms_median=0.25 + goal) for goal in (2, 1, 0)]
-    config = BenchmarkConfig(controllers="mpc,dls", goals=3)
-    results = summarise(rows, config, [BASELINES["mpc"], BASELINES["dls"]], {})
-    assert results["paired"]["nominal"]["dls"]["update_ms_median"]["mean"] == pytest.approx(0.25)
-    table = paired_table(results, ("update_ms_median",), "nominal")
-    ((*_, cell),) = table.rows
-    assert table.headings[1] == "update ms"
-    assert str(cell).startswith("0.25\n[0.25, 0.25], p ")
-
-
 def test_a_planner_that_sees_the_hand_is_held_to_its_aim():
     """Mean, worst and misses of 10 mm, when the planner ends and at the end, also where it got worse."""
     errors = [(0.002, 0.004), (0.014, 0.008), (0.005, 0.012)]

@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 
 from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, sample_goal
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.scripts.bench.goal_reaching.config import PROFILES
 from handrail.scripts.bench.goal_reaching.profiles import NOTHING_YET, SPEEDS, profile_commands
@@ -100,8 +99,3 @@ def test_after_the_end_nothing_is_asked(profile):
     assert len(arriving) == T_MAX - sent.end
     np.testing.assert_array_equal(arriving, 0.0)
     assert np.any(sent.twists[sent.delivered[sent.end - 1]])
-
-
-def test_an_unknown_profile_is_named():
-    with pytest.raises(HandrailError, match="unknown profile 'sleepy': expected one of delay"):
-        commands(1, "sleepy")

@@ -4,7 +4,6 @@ import json
 
 import pytest
 
-from handrail.controllers.errors import HandrailError
 from handrail.datasets.storage.strict_json import write_json
 from handrail.scripts.bench.speed.config import ProfileConfig
 from handrail.scripts.bench.speed.profiling import profile
@@ -62,15 +61,3 @@ def test_every_qp_solver_solves_the_same_qps():
             assert entry["violation"] < 2e-5
             assert entry["objective_excess_worst"] < 1e-3
             assert entry["ratio"] * entry["median_ms"] == pytest.approx(case["solvers"]["own"]["median_ms"])
-
-
-@pytest.mark.parametrize(
-    ("config", "said"),
-    [
-        (ProfileConfig(updates=3), "--updates: expected a whole number >= 10"),
-        (ProfileConfig(json="/nowhere/at/all.json"), "--json /nowhere/at/all.json: expected a file in an"),
-    ],
-)
-def test_bad_settings_are_named(config, said):
-    with pytest.raises(HandrailError, match=said):
-        config.check()

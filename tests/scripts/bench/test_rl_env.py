@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 import handrail.policies  # noqa: F401  (registers the environment)
 from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, pose_error, sample_goal
-from handrail.controllers.baselines.arm_completion import ArmCompletion
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import Pose, load_model
@@ -129,21 +128,6 @@ def test_physics_are_the_ideal_robot_s_but_for_the_servos():
     assert not np.allclose(one.q, other.q, atol=1e-9)
 
 
-def test_the_arm_follows_the_planner_where_nothing_limits_it():
-    """Law: without damping and with a base at rest the tool arrives where the planner does."""
-    env = GoalReachingEnv(early_failure=False)
-    env.arm = ArmCompletion(env.model, damping=1e-9)
-    start = env.model.pose(env.model.description.home)
-    goal = Pose(start.position + [-0.1, 0.1, 0.05], start.rotation)
-    env.reset(options={"goal": goal})
-    for t in range(env.planner.steps + 3):
-        env.step(np.zeros(3))
-        tool = env.model.pose(env.q)
-        d, r = pose_error(tool.position, tool.rotation, Pose(*env.planner.pose(t + 1)))
-        assert d < 0.01  # the first steps, while the arm accelerates, and first-order integration
-        assert r < 1e-3
-
-
 def test_reward_is_the_paper_s():
     action, previous = np.array([0.5, 0.0, -1.0]), np.array([0.0, 1.0, -1.0])
     expected = -0.5 * (0.2**2 / 0.1**2 + 0.1**2 / 0.05**2) - 0.05 * 1.25 - 0.05 * 1.25
@@ -198,24 +182,19 @@ def give_up(env: GoalReachingEnv) -> None:
     assert info["failed"]
 
 
-def test_a_missed_goal_is_tried_again():
-    env = GoalReachingEnv(physics=False, repeat_missed=1.0)
-    env.reset(seed=5, options={"goal": NEAR})
-    for _ in range(3):
-        give_up(env)
-        env.reset()
-        assert env.planner.goal is NEAR
-    env.reset()  # it was not missed again
-    assert env.planner.goal is not NEAR
-
-
-def test_goals_are_new_unless_misses_are_asked_for():
-    env, rng = GoalReachingEnv(physics=False), np.random.default_rng(5)
+@pytest.mark.parametrize("repeats", [0.0, 1.0])
+def test_a_missed_goal_is_tried_again_where_that_is_asked_for(repeats):
+    env, rng = GoalReachingEnv(physics=False, repeat_missed=repeats), np.random.default_rng(5)
     env.reset(seed=5)
+    first = sample_goal(rng).position
     for _ in range(3):
-        assert np.array_equal(env.planner.goal.position, sample_goal(rng).position)
+        assert np.array_equal(env.planner.goal.position, first)
         give_up(env)
         env.reset()
+        first = first if repeats else sample_goal(rng).position
+    if repeats:
+        env.reset()  # it was not missed again
+        assert not np.array_equal(env.planner.goal.position, first)
 
 
 def test_an_evaluation_goes_on_to_the_last_step():

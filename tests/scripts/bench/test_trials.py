@@ -78,14 +78,6 @@ def test_another_file_is_left_alone(config, tmp_path):
         assert path.read_text() == content
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"tasks": "juggle"}, {"modes": ""}, {"modes": "ee,ee"}, {"episodes": 0}, {"json": "x"}]
-)
-def test_wrong_settings_name_the_flag(config, wrong):
-    with pytest.raises(HandrailError, match=f"--{next(iter(wrong))}|unknown task"):
-        replace(config, **wrong).check()
-
-
 def test_a_table_counts_every_episode():
     failed = replace(DONE, success=False, failure_reason="timeout", seconds=16.0, switches=3, switching=2.0)
     line = trials_table(
