@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from robot_helpers import without_shapes
+from ideal_robot import without_shapes
 
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent

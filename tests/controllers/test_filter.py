@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from collect_helpers import environment
-from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, intent, roll
-from robot_helpers import without_shapes
+from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, intent, roll, without_shapes
 
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.task import Start

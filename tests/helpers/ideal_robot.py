@@ -9,7 +9,8 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.description import RobotDescription
+from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 
 MODEL = load_model()
@@ -19,6 +20,13 @@ CHANNELS = Channels.of(MODEL.description)
 REST = np.zeros(MODEL.size)
 PERIOD = 0.05
 TRAIL = 5  # positions looked at in a period
+
+
+def without_shapes(description: RobotDescription) -> RobotModel:
+    """Return a robot that can meet nothing, without a gripper."""
+    hand = replace(description.end_effector, gripper=None)
+    nothing = {"collision": (), "self_pairs": (), "self_margins": np.zeros(0)}
+    return RobotModel(replace(description, end_effector=hand, **nothing))
 
 
 class Robot:

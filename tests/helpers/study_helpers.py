@@ -1,14 +1,13 @@
 """What the tests of studies share: a small design, and jobs that only leave their files, made up."""
 
 import dataclasses
-import functools
 import shutil
-import tempfile
 from itertools import product
-from pathlib import Path
 
 import numpy as np
+from canned import canned
 from datasets_helpers import create, frame_of
+from places import ROOT
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT
@@ -18,61 +17,19 @@ from handrail.policies.study.progress import write_json
 from handrail.policies.study.run import run_study
 from handrail.policies.study.settings import evaluations, fingerprint
 
-DESIGN = """
-modes = ["ee", "direct"]
-baseline = "direct"
-draws = 2
-rollouts = 40
-[tasks.reach]
-minutes = 0.1
-episodes = 5
-steps = 10
-[beside]
-intents = ["ee"]
-draws = 2
-[robustness]
-perturbations = ["push"]
-protections = ["filter"]
-rollouts = 20
-draws = 2
-"""
-
-SMALLEST = """
-modes = ["ee", "direct"]
-baseline = "direct"
-draws = 2
-rollouts = 3
-persons = 2
-[tasks.reach]
-minutes = 0.6
-episodes = 7
-rollout_limit = 1.5
-steps = 20
-[flat]
-every = 5
-patience = 1
-[beside]
-intents = ["ee"]
-draws = 1
-same_number = 1
-[robustness]
-perturbations = ["push"]
-protections = ["filter"]
-rollouts = 2
-draws = 1
-"""  # of real jobs
+DESIGN, SMALLEST = (
+    (ROOT / "tests" / "data" / "studies" / f"{name}.toml").read_text() for name in ("small", "smallest")
+)
+"""Of jobs that are made up, and of real ones."""
 
 
-@functools.cache
-def recorded():
-    """Record once what every job of recording leaves; it is gone when the tests are over."""
-    folder = tempfile.TemporaryDirectory()
-    with create(Path(folder.name, "set")) as writer:
+def what_is_recorded(root):
+    """Record what every job of recording leaves."""
+    with create(root) as writer:
         for episode in range(6):
             for index in range(12):
                 writer.add_frame(frame_of(episode, index, cameras=False), "reach")
             writer.save_episode({"success": episode > 0, "failure_reason": "timeout", "seed": episode})
-    return folder
 
 
 COLLECTED = {
@@ -101,7 +58,7 @@ def make(job, design, layout, shares=None):
         shares: success by label, of each draw; then datasets and policies are left out, as if they were gone.
     """
     if job.policy is None and shares is None:
-        shutil.copytree(Path(recorded().name, "set"), layout.dataset(job.cell), dirs_exist_ok=True)
+        shutil.copytree(canned(what_is_recorded), layout.dataset(job.cell), dirs_exist_ok=True)
     elif job.policy:
         rng = np.random.default_rng(job.cell.draw)
         share = 0.9 if job.cell.mode == "ee" else 0.3
