@@ -13,7 +13,7 @@ WRONG = (
     ("goal_reaching", "--profile slow", "unknown profile 'slow': expected one of all, delay"),
     ("goal_reaching", "--goals 0", "--goals: expected a whole number >= 1"),
     ("goal_reaching", "--workers 1000", "--workers 1000: expected a whole number from 1 to 256"),
-    ("goal_reaching", "--json /nowhere/all.json", "/nowhere/all.json: expected a file in an existing"),
+    ("goal_reaching", "--json /nowhere/at/all.json", "/nowhere/at/all.json: expected a file in an existing"),
     ("goal_reaching", "--page results.txt", "--page results.txt: expected a .md file"),
     ("goal_reaching", f"--report {__file__}", "expected a folder, found a file"),
     ("cases", "d", "unknown case 'd': expected one of a, b, c"),
