@@ -35,15 +35,8 @@ EPISODES = (
     ("lekiwi", "pick_place", "ee", "--seed=10"),
 )
 PICTURES = (("reach", "ee"), ("pick_place", "switching"))
-TIMED = {
-    "wall_time_s",
-    "cpu_time_s",
-    "update_ms_median",
-    "updates_per_s",
-    "timing",
-    "update_s",
-    "dataloading_s",
-}
+TIMED = ("wall_time_s", "cpu_time_s", "update_ms_median", "updates_per_s", "timing")
+TIMED += ("update_s", "dataloading_s")
 
 
 def run(name: str, *words: str) -> str:
@@ -120,14 +113,8 @@ def table(folder: Path) -> dict:
 
 def comparison(folder: Path) -> dict:
     for mode in ("ee", "direct"):
-        run(
-            "record",
-            str(folder / mode),
-            "--task=reach",
-            f"--mode={mode}",
-            "--dataset.num_episodes=12",
-            "--workers=1",
-        )
+        words = ("--task=reach", f"--mode={mode}", "--dataset.num_episodes=12", "--workers=1")
+        run("record", str(folder / mode), *words)
     run("compare", str(folder / "ee"), str(folder / "direct"), f"--output={folder / 'compare'}")
     rows = rows_of(folder / "compare" / "differences.csv")
     return {f"compare {row['view']} {row['metric']}": row for row in rows}

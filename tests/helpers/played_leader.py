@@ -10,14 +10,8 @@ from lerobot.teleoperators.teleoperator import Teleoperator
 
 from handrail.collect.devices.calibration import LeaderCalibration, LeaderGripper, LeaderJoint
 
-UR10 = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
+UR10 = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint")
+UR10 += ("wrist_3_joint",)
 DEGREE = 3.141592653589793 / 180.0
 CALIBRATION = LeaderCalibration(
     {

@@ -28,14 +28,8 @@ STATE = (
     *(f"tool.{part}" for part in POSE),
 )
 ENVIRONMENT = tuple(f"goal.{part}" for part in POSE)
-TINY = (
-    "chunk_size=4",
-    "n_action_steps=2",
-    "dim_model=16",
-    "n_heads=2",
-    "dim_feedforward=16",
-    "n_encoder_layers=1",
-)
+TINY = ("chunk_size=4", "n_action_steps=2", "dim_model=16", "n_heads=2")
+TINY += ("dim_feedforward=16", "n_encoder_layers=1")
 _COLUMNS = ("observation.state", "observation.environment_state", "action", "teleop.values", "teleop.mask")
 
 

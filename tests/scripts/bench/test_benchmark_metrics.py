@@ -17,7 +17,7 @@ from handrail.scripts.bench.goal_reaching.metrics import (
     measure,
     summarise,
 )
-from handrail.scripts.bench.goal_reaching.tables import paired_table, profile_tables
+from handrail.scripts.bench.goal_reaching.tables import profile_tables
 
 MODEL = load_model()
 COLLISION = CollisionModel(MODEL)

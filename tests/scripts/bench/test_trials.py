@@ -76,20 +76,3 @@ def test_another_file_is_left_alone(config, tmp_path):
         with pytest.raises(HandrailError, match="--json"):
             TrialsFile(path, config)
         assert path.read_text() == content
-
-
-def test_a_table_counts_every_episode():
-    failed = replace(DONE, success=False, failure_reason="timeout", seconds=16.0, switches=3, switching=2.0)
-    line = trials_table(
-        [DONE, DONE, replace(failed, contacts=7, smallest_distance=-0.01)], ["base", "ee"], "reach"
-    ).rows
-    cells = dict(zip(HEADINGS, line[0], strict=True))
-    assert len(line) == 1
-    assert cells["success"] == "2 of 3"
-    assert cells["95 %"] == "21 to 94 %"
-    assert cells["failures"] == "timeout (1)"
-    assert cells["time of successes [s]"] == "4.0 ± 0.0"
-    assert cells["episodes with contact"] == "1"
-    assert cells["smallest distance [m]"] == "-0.010"
-    assert cells["switches"] == "1.0"
-    assert cells["time in switches"] == "8.3 %"
