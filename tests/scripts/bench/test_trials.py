@@ -9,8 +9,6 @@ from handrail.controllers.errors import HandrailError
 from handrail.scripts.bench.operators.file import OperatorTrial, TrialsConfig, TrialsFile
 from handrail.scripts.bench.operators.trials import HEADINGS, run_trials, trials_table
 
-DONE = OperatorTrial("reach", "ee", 0, 0, True, "", 4.0, 80, 0, 0.05, 0, 0, 0.0)
-
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory):
