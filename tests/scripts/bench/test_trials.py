@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.scripts.bench.operators.file import OperatorTrial, TrialsConfig, TrialsFile
-from handrail.scripts.bench.operators.trials import HEADINGS, run_trials, trials_table
+from handrail.scripts.bench.operators.file import TrialsConfig, TrialsFile
+from handrail.scripts.bench.operators.trials import run_trials
 
 
 @pytest.fixture(scope="module")
