@@ -57,5 +57,5 @@ def _caption(rows: Sequence[Mapping[str, Any]]) -> str:
         for part in ("policy", "controller", "environment")
         if timed
     ]
-    said = "time of a step, median: " + ", ".join(words) + "\n" if words else ""
+    said = f"time of a step, median: {', '.join(words)}; " if words else ""
     return said + "intervals of the rollouts alone (Wilson); handrail-compare adds those of training"

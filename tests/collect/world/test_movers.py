@@ -10,6 +10,7 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.observation import MOST, from_numbers, to_numbers
 from handrail.collect.world.scene import Patrol, Scene, SceneObject
 from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.reach import FASTEST, Reach, sample_movers
@@ -20,7 +21,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import Pose, load_model
-from handrail.controllers.robot.shape import Shape
+from handrail.controllers.robot.shape import Obstacle, Shape
 
 MODEL = load_model()
 HOME = MODEL.description.home
@@ -155,3 +156,22 @@ def test_an_episode_among_movers_is_the_seeds():
     assert first.contact_onsets == 0
     assert first.frames == again.frames
     np.testing.assert_array_equal(q, same)
+
+
+def test_what_stands_around_becomes_numbers_and_back():
+    env = build_env(SessionConfig(task="reach", moving_obstacles=2), 20)
+    env.reset(seed=1)
+    held = Obstacle("cup", Shape("cylinder", np.array([0.03, 0.1])), np.array([0, 0, 0.1]), frame="tool")
+    there = (*env.obstacles(), held)
+    back = from_numbers(to_numbers(there))
+    assert len(back) == len(there) > 2
+    for one, other in zip(there, back, strict=True):
+        words = [(each.shape.kind, each.frame, each.work_surface) for each in (one, other)]
+        assert words[0] == words[1]
+        for name in ("position", "rotation", "velocity"):
+            np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=1e-6)
+        np.testing.assert_allclose(one.shape.size, other.shape.size, atol=1e-6)
+    with pytest.raises(HandrailError, match=f"expected {MOST} at most"):
+        to_numbers((held,) * (MOST + 1))
+    with pytest.raises(HandrailError, match="expected rows of"):
+        from_numbers(np.full((2, 21), 0.5))

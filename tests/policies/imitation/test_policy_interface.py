@@ -43,6 +43,12 @@ def read_interface(content):
     return decoded(content, PolicyInterface, "policy interface")
 
 
+def made(seed, actions, *masks):
+    """Return a made-up episode, and the interface of a policy that learns it."""
+    columns = episode(np.random.default_rng(seed), masks or [("ee",)])
+    return columns, PolicyInterface.of_dataset(FEATURES, [columns], actions)
+
+
 def observed(interface, columns):
     return interface.observe(columns["observation.state"], columns["observation.environment_state"])
 
@@ -103,8 +109,7 @@ def test_same_everywhere(actions):
 
 def test_a_policy_sees_where_the_base_is():
     """Its place and heading, after all else; who sees nothing of it sees the same otherwise."""
-    columns = episode(np.random.default_rng(2), [("ee",)])
-    placed = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    columns, placed = made(2, "realised")
     without = dataclasses.replace(placed, base_pose=False)
     (state, around), (less, same) = observed(placed, columns), observed(without, columns)
     x, y, yaw = columns["observation.state"][:, :3].T
@@ -117,7 +122,7 @@ def test_a_policy_sees_where_the_base_is():
 
 def test_an_older_checkpoint_keeps_its_view():
     """It does not say whether it sees where the base is: then it does not."""
-    interface = PolicyInterface.of_dataset(FEATURES, [episode(np.random.default_rng(3), [("ee",)])], "intent")
+    _, interface = made(3, "intent")
     content = json.loads(json.dumps(dataclasses.asdict(interface)))
     assert read_interface(content) == interface
     del content["base_pose"]
@@ -127,15 +132,14 @@ def test_an_older_checkpoint_keeps_its_view():
 
 
 def test_a_policy_does_not_see_how_fast_the_robot_moves():
-    columns = episode(np.random.default_rng(1), [("ee",)])
+    columns, interface = made(1, "realised")
     faster, farther = (np.array(columns["observation.state"]) for _ in range(2))
     n = len(JOINTS)
     faster[:, n : 2 * n] *= 3.0
     farther[:, 5] += 0.1
-    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    states = columns["observation.state"], faster, farther
     seen, same, other = (
-        np.column_stack(interface.observe(state, columns["observation.environment_state"]))
-        for state in (columns["observation.state"], faster, farther)
+        np.hstack(observed(interface, columns | {"observation.state": state})) for state in states
     )
     np.testing.assert_array_equal(seen, same)
     assert not np.array_equal(seen, other)
@@ -144,8 +148,7 @@ def test_a_policy_does_not_see_how_fast_the_robot_moves():
 @pytest.mark.parametrize("masks", [[("ee",)], [("base",), ("ee",)], [("joint",)], [("ee.vx", "ee.wz")]])
 def test_intent_comes_back(masks):
     """The intent that an action stands for is the one that was recorded."""
-    columns = episode(np.random.default_rng(1), masks)
-    interface = PolicyInterface.of_dataset(FEATURES, [columns], "intent")
+    columns, interface = made(1, "intent", *masks)
     for t, action in enumerate(interface.encode(columns)):
         intent = interface.decode(action, columns["observation.state"][t])
         np.testing.assert_allclose(intent.values, columns["teleop.values"][t, :-1], atol=1e-5)
@@ -154,8 +157,7 @@ def test_intent_comes_back(masks):
 
 
 def test_realised_is_the_next_velocity():
-    columns = episode(np.random.default_rng(2), [("ee",)])
-    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    columns, interface = made(2, "realised")
     state, n = columns["observation.state"], len(JOINTS)
     for t, action in enumerate(interface.encode(columns)[:-1]):
         intent = interface.decode(action, state[t])
@@ -176,8 +178,7 @@ def test_at_the_goal_the_errors_vanish():
 
 
 def test_what_is_not_there_stays_zero():
-    columns = episode(np.random.default_rng(4), [("ee",)])
-    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    columns, interface = made(4, "realised")
     _, around = observed(interface, columns)
     names = interface.observation_names[1]
     assert around.shape[1] == len(names)

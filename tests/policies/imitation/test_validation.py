@@ -125,17 +125,3 @@ def test_cut_off_anywhere_it_ends_the_same_to_the_bit(flat, tmp_path):
         again = train(dataclasses.replace(config, output=str(cut), resume=True), quiet=True)
         assert weights(again) == weights(folder)
         assert read_meta(again).validation == read_meta(folder).validation
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"patience": 2}, "expected --eval_split too"),
-        ({"eval_split": 1.0}, "--eval_split: expected a number < 1"),
-        ({"eval_split": 0.1, "patience": -1}, "--patience: expected"),
-        ({"eval_split": 0.1, "eval_steps": 0}, "--eval_steps: expected"),
-        ({"eval_split": 0.1, "improvement": float("nan")}, "--improvement: expected"),
-    ],
-)
-def test_wrong_settings_are_one_line(settings, said, recorded, tmp_path):
-    refused(tiny(recorded, tmp_path / "policy", **settings), said)

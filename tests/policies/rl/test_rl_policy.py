@@ -1,4 +1,6 @@
-"""The actor in plain arrays: the same as the network that was trained, and safe to load."""
+"""The actor in plain arrays: the same as the network that was trained, safe to load, as good as said."""
+
+import json
 
 import numpy as np
 import pytest
@@ -6,7 +8,8 @@ from rl_helpers import random_actor
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.rl.observation import conditioning
-from handrail.policies.rl.policy import Actor
+from handrail.policies.rl.policy import SHIPPED, Actor
+from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals
 
 
 def test_a_file_gives_the_same_actor_back(tmp_path):
@@ -67,3 +70,19 @@ def test_plain_arrays_act_like_the_trained_network():
         expected, _ = model.predict((P @ observation).astype(np.float32), deterministic=True)
         assert np.allclose(actor(observation), expected, atol=1e-5)
         observation, *_ = env.step(env.action_space.sample())
+
+
+def test_the_record_is_the_actor_s():
+    """Law: what the record says of goals reached is true of goals drawn in the same way."""
+    record = json.loads((SHIPPED / "actor.json").read_text())
+    said = record["final"]
+    scores = evaluate(Actor.load(), evaluation_goals(20, FINAL_SEED), record["settings"]["physics"])
+    assert said["success"]["mean"] >= 0.9
+    assert sum(score["success"] for score in scores) >= 18
+    lengths = [score["length"] for score in scores]
+    assert said["length"]["min"] <= min(lengths)
+    assert max(lengths) <= said["length"]["max"]
+
+
+def test_it_is_small():
+    assert (SHIPPED / "actor.npz").stat().st_size < 3_000_000
