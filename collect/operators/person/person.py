@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 
@@ -101,19 +100,33 @@ class Person:
 
     def ask(self, ask: Ask) -> None:
         """Do what the operator asks for; what makes no sense now is left undone."""
-        what, value = ask.what, ask.value
-        if what in _EVENTS:
-            self._judge(_EVENTS[what])
-        elif what == "stop":
-            self.phase, self._armed = (Phase.STOPPED if value else Phase.PAUSED), False
-        elif what == "start" and self.phase in (Phase.READY, Phase.PAUSED):
-            self.phase, self._armed = Phase.DRIVING, False
-        elif what == "pause" and self.phase in (Phase.DRIVING, Phase.LOST):
-            self.phase = Phase.PAUSED
-        elif what == "practice" and self.phase is Phase.READY:
-            self.practises = value
-        else:
-            self._choose(what, value)
+        setting, channels, value = self.setting, self.meaning.channels, ask.value
+        match ask.what:
+            case what if what in _EVENTS:
+                self._judge(_EVENTS[what])
+            case "stop":
+                self.phase, self._armed = (Phase.STOPPED if value else Phase.PAUSED), False
+            case "start" if self.phase in (Phase.READY, Phase.PAUSED):
+                self.phase, self._armed = Phase.DRIVING, False
+            case "pause" if self.phase in (Phase.DRIVING, Phase.LOST):
+                self.phase = Phase.PAUSED
+            case "practice" if self.phase is Phase.READY:
+                self.practises = value
+            case "mode" if value in self.modes and value != setting.mode.name:
+                self.setting = setting.switched(mode=self.modes[value])
+            case "mask" if isinstance(value, tuple):
+                bits = "".join("01"[index in value] for index in range(channels.size))
+                mode = mode_of_mask(bits, channels)
+                self.setting = setting if mode.name == setting.mode.name else setting.switched(mode=mode)
+            case "focus" if value in ("hand", "base") and value != setting.focus:
+                self.setting = setting.switched(focus=value)
+            case "frame" if value in HAND_FRAMES:
+                self.setting = replace(setting, frame=value)
+            case "speed":
+                self.setting = replace(setting, speed=max(value, 0.05))
+            case "lock" if isinstance(value, tuple):
+                locked = sorted({joint for joint in value if 0 <= joint < len(channels.joints)})
+                self.setting = setting.switched(locked=tuple(locked))
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
@@ -159,25 +172,3 @@ class Person:
         elif self.phase is not Phase.READY or event.drops:
             self._event = event
             self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.PAUSED
-
-    def _choose(self, what: str, value: Any) -> None:
-        setting = self.setting
-        if what == "mode" and value in self.modes and value != setting.mode.name:
-            self.setting = setting.switched(mode=self.modes[value])
-        elif what == "mask" and isinstance(value, tuple):
-            mode = mode_of_mask(self._bits(value), self.meaning.channels)
-            self.setting = setting if mode.name == setting.mode.name else setting.switched(mode=mode)
-        elif what == "focus" and value in ("hand", "base") and value != setting.focus:
-            self.setting = setting.switched(focus=value)
-        elif what == "frame" and value in HAND_FRAMES:
-            self.setting = replace(setting, frame=value)
-        elif what == "speed":
-            self.setting = replace(setting, speed=max(value, 0.05))
-        elif what == "lock" and isinstance(value, tuple):
-            joints = tuple(
-                sorted({joint for joint in value if 0 <= joint < len(self.meaning.channels.joints)})
-            )
-            self.setting = setting.switched(locked=joints)
-
-    def _bits(self, indices: tuple[int, ...]) -> str:
-        return "".join("01"[index in indices] for index in range(self.meaning.channels.size))

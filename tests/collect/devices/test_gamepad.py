@@ -36,14 +36,11 @@ def pad(plugged):
 
 
 def test_recorded_events_come_out_as_deflections_and_presses(plugged, pad):
-    seen = []
+    at = {}
     for event in recorded("gamepad.json"):
         plugged.move(event["control"], event["value"])
         reading = pad.read()
-        seen.append(
-            (event["time"], {k: round(v, 2) for k, v in reading.deflections.items()}, reading.presses)
-        )
-    at = {time: (held, presses) for time, held, presses in seen}
+        at[event["time"]] = {k: round(v, 2) for k, v in reading.deflections.items()}, reading.presses
     assert at[0.0] == ({}, ())  # a worn stick
     assert at[0.2] == ({"left_shoulder": 1.0}, ("left_shoulder",))
     assert at[0.35][0] == {"left_shoulder": 1.0}

@@ -57,11 +57,7 @@ def pressed(readings):
 
 def test_a_plain_terminal(keys, terminal, clock):
     readings = play(keys, terminal, clock, "terminal_xterm.json")
-    assert held(readings, "w") == [
-        [0.3, 0.5],
-        [0.8, 1.1],
-        [3.4, 3.6],
-    ]  # let go 0.2 s after its last character
+    assert held(readings, "w") == [[0.3, 0.5], [0.8, 1.1], [3.4, 3.6]]  # until 0.2 s after its last character
     assert pressed(readings) == [
         (0.3, "w"),  # and what the terminal repeats is not pressed again
         (1.31, "right"),
