@@ -36,7 +36,7 @@ class Device(Protocol):
 
     @property
     def name(self) -> str:
-        """What the data call it."""
+        """Name in the data."""
         ...
 
     def open(self) -> None:

@@ -74,10 +74,12 @@ class DeviceReader:
             self._opened.set()
             while not self._ended.is_set():
                 try:
-                    self._read_on()
+                    newest = self._attempt(self.device.read)
                 except DeviceGoneError as error:
                     self._lose(error)
                     self._find_again()
+                else:
+                    self._keep(newest)
         except BaseException as error:
             self._refusal = error
             self._lose(error)
@@ -85,12 +87,10 @@ class DeviceReader:
         finally:
             self._close()
 
-    def _read_on(self) -> None:
-        while not self._ended.is_set():
-            newest = self._attempt(self.device.read)
-            with self._lock:
-                self._newest = newest
-                self._presses += newest.presses
+    def _keep(self, newest: DeviceInput) -> None:
+        with self._lock:
+            self._newest = newest
+            self._presses += newest.presses
 
     def _find_again(self) -> None:
         while not self._ended.wait(self._retry):

@@ -60,10 +60,9 @@ class Gamepad:
         self._pygame.event.clear()
         if not self._pad.attached():
             raise DeviceGoneError("gamepad: unplugged; plug it in again, then press start")
-        raw = {name: self._pad.get_axis(index) / _FULL for index, name in enumerate(AXES)}
-        shaped = {name: self._shape(value) for name, value in raw.items()}
+        sticks = {name: self._shape(self._pad.get_axis(index) / _FULL) for index, name in enumerate(AXES)}
         buttons = {name: 1.0 for index, name in enumerate(BUTTONS) if self._pad.get_button(index)}
-        held = {name: value for name, value in {**shaped, **buttons}.items() if value}
+        held = {name: value for name, value in sticks.items() if value} | buttons
         before, self._down = self._down, frozenset(held)
         presses = tuple(name for name in CONTROLS if name in self._down - before)
         return DeviceInput(self._clock(), held, presses)

@@ -112,9 +112,8 @@ class _Guide:
         now = self._positions()
         changes = {name: now[name] - before[name] for name in before if name in now}
         order = sorted(changes, key=lambda name: -abs(changes[name]))
-        if not order or order[0] in self._taken:
-            return "", 0.0
-        if len(order) > 1 and abs(changes[order[1]]) > _CLEAR * abs(changes[order[0]]):
+        most, second = [*(abs(changes[name]) for name in order), 0.0, 0.0][:2]
+        if not order or order[0] in self._taken or second > _CLEAR * most:
             return "", 0.0
         return order[0], changes[order[0]]
 

@@ -14,8 +14,8 @@ from handrail.collect.devices.key_bytes import (
     FOCUS_IN,
     FOCUS_OUT,
     INTERRUPT,
-    SIGNALS,
     TELLS_RELEASES,
+    THERE,
     Key,
     KeyBytes,
 )
@@ -173,25 +173,21 @@ class Keyboard:
 
     def _takes(self, key: Key, now: float) -> bool:
         """Take a key; return whether it was pressed now."""
-        if key.name in SIGNALS:
-            self._take_signal(key.name)
-            return False
-        if key.change == "up":
-            self._held.pop(key.name, None)
-            return False
-        before = self._last.get(key.name, -_AGAIN)
-        self._last[key.name] = self._held[key.name] = now
-        return key.change == "down" and (self._tells_releases or now - before >= _AGAIN)
-
-    def _take_signal(self, name: str) -> None:
-        if name == INTERRUPT:
+        if key.name == INTERRUPT:
             _thread.interrupt_main()
-        elif name == TELLS_RELEASES:
+        elif key.name == TELLS_RELEASES:
             self._tells_releases = True
             self._terminal.tell_releases()
-        elif name in (FOCUS_IN, FOCUS_OUT):
-            self._in_focus = name == FOCUS_IN
+        elif key.name in (FOCUS_IN, FOCUS_OUT):
+            self._in_focus = key.name == FOCUS_IN
             self._held.clear()
+        elif key.change == "up":
+            self._held.pop(key.name, None)
+        elif key.name != THERE:
+            before = self._last.get(key.name, -_AGAIN)
+            self._last[key.name] = self._held[key.name] = now
+            return key.change == "down" and (self._tells_releases or now - before >= _AGAIN)
+        return False
 
     def _is_silent(self, now: float) -> bool:
         """Whether the terminal does not answer any more; ask it."""

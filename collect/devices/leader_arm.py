@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from handrail.collect.devices.device import DeviceGoneError, DeviceInput
+from handrail.collect.processor.units import number
 from handrail.collect.teleop_config import LeaderConfig
 from handrail.controllers.errors import HandrailError, message_of, shown, unknown_name
 
@@ -58,13 +59,12 @@ class LeaderArm:
         """Return its joint positions."""
         assert self._teleoperator is not None
         time.sleep(_PERIOD)
-        trouble = "what it says makes no sense"
         try:
-            joints = self._checked(self._teleoperator.get_action())
+            said, trouble = self._teleoperator.get_action(), "what it says makes no sense"
         except Exception as error:  # whatever a driver's code raises
-            joints, trouble = None, message_of(error)
-        now = self._clock()
-        if joints is not None and self._follows(joints, now):
+            said, trouble = None, message_of(error)
+        now, joints = self._clock(), {name: number(said, name) for name in self._sources}
+        if self._makes_sense(joints, now):
             self._last = DeviceInput(now, joints=joints)
             return self._last
         self.dropped += 1
@@ -78,19 +78,13 @@ class LeaderArm:
         if teleoperator is not None and teleoperator.is_connected:
             teleoperator.disconnect()
 
-    def _checked(self, action: Any) -> Mapping[str, float] | None:
-        """Return the positions that are needed; None where one is missing or no finite number."""
-        if not isinstance(action, Mapping):
-            return None
-        joints = {name: float(action[name]) for name in self._sources}
-        return joints if all(map(math.isfinite, joints.values())) else None
-
-    def _follows(self, joints: Mapping[str, float], now: float) -> bool:
-        """Whether a hand can have moved it so since the last good reading; after a long time, it can."""
-        before = self._last.joints
-        if not before or now - self._last.time > _GONE / 2:
-            return True
-        return all(abs(joints[name] - before[name]) < _MOST_STEP * _HALF_TURN for name in joints)
+    def _makes_sense(self, joints: Mapping[str, float], now: float) -> bool:
+        """Whether all is finite, and a hand can have moved it so since; after a long time, it can."""
+        before = self._last.joints if now - self._last.time <= _GONE / 2 else {}
+        return all(
+            math.isfinite(place) and abs(place - before.get(name, place)) < _MOST_STEP * _HALF_TURN
+            for name, place in joints.items()
+        )
 
 
 def connected(teleoperator: "Teleoperator", name: str, calibrate: bool = False) -> "Teleoperator":

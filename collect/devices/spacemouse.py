@@ -100,28 +100,20 @@ class SpaceMouse:
         """Take a report; return the buttons that it says went down."""
         kind, data = report[0], report[1:]
         if kind == _BUTTONS and data:
-            return self._take_buttons(int.from_bytes(data[:4], "little"))
-        if kind == _TRANSLATION and len(data) >= 12:
-            self._take_axes(AXES, data[:12])
-        elif kind in (_TRANSLATION, _ROTATION) and len(data) >= 6:
-            self._take_axes(AXES[:3] if kind == _TRANSLATION else AXES[3:], data[:6])
-        else:
+            bits, before = int.from_bytes(data[:4], "little"), self._down
+            self._down = frozenset(f"button_{index + 1}" for index in range(32) if bits >> index & 1)
+            return sorted(self._down - before)
+        of_translation = AXES if len(data) >= 12 else AXES[:3]
+        names = {_TRANSLATION: of_translation, _ROTATION: AXES[3:]}.get(kind, ())
+        whole = names and len(data) >= 2 * len(names)
+        counts = struct.unpack_from(f"<{len(names)}h", data) if whole else ()
+        if not counts or max(map(abs, counts)) > _MOST * _FULL:
             self.dropped += 1
-        return []
-
-    def _take_axes(self, names: tuple[str, ...], data: bytes) -> None:
-        counts = struct.unpack(f"<{len(names)}h", data)
-        if max(map(abs, counts)) > _MOST * _FULL:
-            self.dropped += 1
-            return
+            return []
         for name, at in zip(names, _OF_DEVICE, strict=False):
             self._axes[name] = self._shape(-counts[at] / _FULL)
         self._heard = self._clock()
-
-    def _take_buttons(self, bits: int) -> list[str]:
-        down = frozenset(f"button_{index + 1}" for index in range(32) if bits >> index & 1)
-        before, self._down = self._down, down
-        return sorted(down - before)
+        return []
 
 
 def _is_one(device: dict[str, Any]) -> bool:

@@ -207,6 +207,10 @@ def test_it_says_the_robot_s_own_action():
         ({"fps": 0}, "fps"),
         ({"fps": 9}, "at least 10 Hz"),
         ({"start": [0, 0]}, "start"),
+        ({"start": [0, math.inf, 0]}, "start"),
+        ({"timeout": math.nan}, "timeout"),
+        ({"settings": 3}, "settings: expected a table"),
+        ({"units": {"joints": {}, "gripper": {"name": "g", "opened": 1, "closed": 1}}}, "to differ"),
         ({"tool_frame": "moon"}, "tool_frame"),
     ],
 )
