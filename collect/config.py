@@ -11,13 +11,13 @@ from msgspec import Meta
 from handrail.collect.client_config import ClientConfig
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.flags import one_of, only_one
+from handrail.collect.flags import check_file, check_names, names, one_of, only_one
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.teleop_config import TeleopConfig
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.typed import AtLeastOne, Count, check_settings
 from handrail.datasets.advanced import Advanced
@@ -59,7 +59,7 @@ class SessionConfig:
     seed: Count = 0
     """Of scenes and operator: the same seed and versions give the same data."""
     cameras: Names = ""
-    """Cameras to record: wrist, scene or both; none by default."""
+    """Cameras to record: wrist, scene or all; none by default."""
     image_size: Advanced[Annotated[int, Meta(ge=16, le=1024, multiple_of=2)]] = 128
     """Height and width of the pictures [pixels]."""
     realtime: Advanced[bool] = False
@@ -74,7 +74,7 @@ class SessionConfig:
     @property
     def camera_names(self) -> tuple[str, ...]:
         """The cameras asked for."""
-        return tuple(name.strip() for name in self.cameras.split(",") if name.strip())
+        return names(self.cameras, CAMERAS)
 
     @property
     def mode_name(self) -> str:
@@ -86,11 +86,8 @@ class SessionConfig:
         TASKS.check(self.task)
         MODES.check(self.mode)
         OPERATORS.check(self.operator)
-        for camera in self.camera_names:
-            if camera not in CAMERAS:
-                raise unknown_name("camera", camera, CAMERAS)
-        if len(set(self.camera_names)) != len(self.camera_names):
-            raise HandrailError(f"--cameras {self.cameras}: expected each camera once")
+        if self.camera_names:
+            check_names("camera", "--cameras", self.camera_names, CAMERAS)
         check_settings(self, "--")
         if self.moving_obstacles and not TASKS.find(self.task).movers:
             fit = " or ".join(spec.name for spec in TASKS.built_in if spec.movers)
@@ -147,11 +144,6 @@ class DatasetConfig(StoredConfig):
         _ = self.folder
         check_fps(self.fps)
         check_settings(self, "--dataset.")
-
-    @property
-    def is_found(self) -> bool:
-        """Whether the folder is to be found: the first one that fits."""
-        return False
 
 
 @dataclass(frozen=True)
@@ -213,10 +205,7 @@ class RecordConfig(SessionConfig, ExecutionConfig):
         for one, other in (("resume", "overwrite"), ("display_data", "display_web")):
             if getattr(self, one) and getattr(self, other):
                 raise HandrailError(f"--{one} and --{other}: expected one of them, got both")
-        if self.display_save and not self.display_save.endswith(".rrd"):
-            raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
-        if self.display_save and not Path(self.display_save).parent.is_dir():
-            raise HandrailError(f"--display_save {self.display_save}: expected a file in an existing folder")
+        check_file("--display_save", self.display_save, ".rrd")
 
     @property
     def processes(self) -> int:

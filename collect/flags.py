@@ -49,17 +49,21 @@ def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: Collect
         raise HandrailError(f"{flag} {','.join(chosen)}: expected each {thing} once")
 
 
+def check_file(flag: str, file: str, ending: str = "") -> None:
+    """Check that a file can be written, if one is asked for."""
+    if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
+        kind = f"{ending} file" if ending else "file"
+        raise HandrailError(f"{flag} {file}: expected a {kind} in an existing folder")
+
+
 def check_page(page: str) -> None:
     """Check that a Markdown page can be written, if one is asked for."""
-    path = Path(page).expanduser()
-    if page and not (path.suffix == ".md" and path.absolute().parent.is_dir()):
-        raise HandrailError(f"--page {page}: expected a .md file in an existing folder")
+    check_file("--page", page, ".md")
 
 
 def check_json(path: str) -> None:
     """Check that a file of JSON can be written, if one is asked for."""
-    if path and not Path(path).expanduser().absolute().parent.is_dir():
-        raise HandrailError(f"--json {path}: expected a file in an existing folder")
+    check_file("--json", path)
 
 
 def check_whole(config: Any, **least: int) -> None:

@@ -1,5 +1,7 @@
 """What came of a recording, as it goes and at its end."""
 
+import shutil
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +10,6 @@ from pathlib import Path
 
 from rich.table import Table
 
-from handrail.collect.commands.target import next_commands
 from handrail.collect.config import RecordConfig
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
@@ -22,6 +23,10 @@ _DROPPED = {
     EpisodeEvent.RESTART: "begun again",
     EpisodeEvent.QUIT: "not finished",
 }
+_NEXT = """Next:
+  {bin}handrail-inspect {root}    # what was recorded
+  {bin}handrail-replay {root}    # do the same again
+  {bin}handrail-train {root} --output outputs/policy"""
 
 
 def _why_dropped(outcome: Outcome) -> str:
@@ -111,3 +116,19 @@ class RecordingLog:
             ", ".join(f"{part} {1e3 * time / frames:.2f} ms" for part, time in spent.items()),
         )
         return table
+
+
+def next_commands(root: Path) -> str:
+    """Return what to try with a dataset."""
+    here = Path.cwd()
+    near = root.relative_to(here) if root.is_relative_to(here) else root
+    return _NEXT.format(root=near, bin=command_prefix())
+
+
+def command_prefix() -> str:
+    """Return what to write before a command: nothing where the shell finds it, else the folder it is in."""
+    if shutil.which("handrail-record"):
+        return ""
+    folder = Path(sys.executable).parent
+    here = Path.cwd()
+    return f"{folder.relative_to(here) if folder.is_relative_to(here) else folder}/"

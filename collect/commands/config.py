@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from handrail.collect.config import StoredConfig
-from handrail.collect.flags import only_one
+from handrail.collect.flags import check_file, only_one
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.advanced import Advanced
 
@@ -41,8 +41,7 @@ class ReplayConfig:
     def check(self) -> None:
         """Check the settings."""
         for flag, file, ending in (("--sheet", self.sheet, ".png"), ("--video", self.video, ".mp4")):
-            if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
-                raise HandrailError(f"{flag} {file}: expected a {ending} file in an existing folder")
+            check_file(flag, file, ending)
             if file and self.episode < 0:
                 raise HandrailError(f"{flag}: expected --episode with the number of one episode")
 

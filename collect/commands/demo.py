@@ -1,10 +1,10 @@
 """The demo: a few demonstrations, a table, a picture, and what to try next."""
 
+from handrail.collect.commands.account import command_prefix
 from handrail.collect.commands.config import DemoConfig
 from handrail.collect.commands.record import record
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
-from handrail.collect.commands.target import command_prefix
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.session.film import save_sheet
 from handrail.collect.world.gl import graphics_trouble

@@ -6,12 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.commands.account import RecordingLog
-from handrail.collect.commands.recording import Recording, come_first, open_writer, session_writer
+from handrail.collect.commands.recording import (
+    Recording,
+    come_first,
+    located,
+    open_writer,
+    session_writer,
+)
 from handrail.collect.commands.shared import Shards
-from handrail.collect.commands.target import located
 from handrail.collect.config import RecordConfig
-from handrail.collect.execution.bar import WorkBar
-from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.execution import Execution, WorkBar
 from handrail.collect.execution.pool import RECORDING
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.session.build import build_env, build_mode

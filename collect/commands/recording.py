@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.config import RecordConfig
+from handrail.collect.config import FoundDatasetConfig, RecordConfig
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env, build_modes, build_session, session_features
 from handrail.collect.session.outcome import Outcome
@@ -17,12 +17,16 @@ from handrail.collect.session.recorded import settings_json
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.world.env import HandrailEnv
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.versions import SIMULATION, versions
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import CLIENT, Scalar
+from handrail.datasets.recording.folder import is_dataset
 from handrail.datasets.recording.writer import EpisodeWriter
 
+_TRIES = 100  # folders
 _NICE = -10  # of a loop that a person steers, where the system allows that
 
 
@@ -168,3 +172,36 @@ def session_writer(config: RecordConfig, env: HandrailEnv) -> Iterator[EpisodeWr
         for folder in made:
             with suppress(OSError):  # something is in it
                 folder.rmdir()
+
+
+def located(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
+    """Return the settings of a recording with its folder, and whether it adds to a dataset that is there."""
+    if isinstance(config.dataset, FoundDatasetConfig) and config.dataset.is_found:
+        return _found(config, env)
+    goes_on = isinstance(config.dataset, FoundDatasetConfig) and not (config.resume or config.overwrite)
+    if goes_on and is_dataset(Layout(config.dataset.folder.absolute())):
+        return _resumed(config, env)
+    return config
+
+
+def _resumed(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
+    """Return the settings that add to the dataset that is there."""
+    resumed = replace(config, resume=True)
+    open_writer(resumed, env).close()
+    return resumed
+
+
+def _found(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
+    """Return the settings with the first folder that fits, where nobody said one.
+
+    That is `outputs/cockpit/TASK` or the next one with a number: one that is free, or to which these episodes
+    can be added.
+    """
+    first = config.dataset.folder / config.task.replace(":", "_")
+    for folder in (first, *(first.with_name(f"{first.name}-{number}") for number in range(2, _TRIES))):
+        there = replace(config, dataset=replace(config.dataset, place=str(folder)))
+        if config.overwrite or not folder.exists():
+            return there
+        with suppress(HandrailError):
+            return _resumed(there, env)
+    raise HandrailError(f"no folder for the dataset beside {str(first)!r}: say one")

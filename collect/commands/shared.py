@@ -8,10 +8,12 @@ with any number of workers.
 import json
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any, Literal
 
 import pyarrow as pa
@@ -110,8 +112,27 @@ class Shards:
 
         Nothing is encoded anew. Whoever calls has the sole right to write there.
         """
-        with explained(f"cannot write dataset {str(self.root)!r}"):
-            self._merge(jobs, self._lines(jobs, execution.run(jobs), log, execution))
+        whole: SimpleQueue[Result | None] = SimpleQueue()
+        with explained(f"cannot write dataset {str(self.root)!r}"), ThreadPoolExecutor(1) as thread:
+            merge = thread.submit(self._merge, jobs, _in_order(jobs, whole))
+            try:
+                for result in execution.run(jobs):
+                    if result.error:
+                        raise HandrailError(
+                            f"{result.job.name}: {result.error}; what was recorded is kept in {self.folder},"
+                            " and the same flags go on"
+                        )
+                    for outcome in result.value[0]:
+                        log.add(outcome)
+                    execution.say(log.words)
+                    whole.put(result)
+                    if merge.done():  # not all are whole: it failed
+                        merge.result()
+                execution.say(f"{log.words}, merging")
+                merge.result()
+            except BaseException:
+                whole.put(None)
+                raise
 
     def remove(self) -> None:
         """Remove them; the plan first, so that nobody goes on with a part."""
@@ -139,25 +160,6 @@ class Shards:
             log=folder.with_suffix(".log"),
         )
 
-    def _lines(
-        self, jobs: Sequence[Job], results: Iterator[Result], log: RecordingLog, execution: Execution
-    ) -> Iterator[list[EpisodeRecord]]:
-        """Yield the lines of metadata of every shard, in order, while the next ones are recorded."""
-        found: dict[str, list[EpisodeRecord]] = {}
-        for job in jobs:
-            while job.name not in found:
-                result = next(results)
-                if result.error:
-                    raise HandrailError(
-                        f"{result.job.name}: {result.error}; what was recorded is kept in {self.folder},"
-                        " and the same flags go on"
-                    )
-                outcomes, found[result.job.name] = result.value
-                for outcome in outcomes:
-                    log.add(outcome)
-                execution.say(log.words)
-            yield found.pop(job.name)  # some 50 kB an episode
-
     def _merge(self, jobs: Sequence[Job], lines: Iterator[list[EpisodeRecord]]) -> None:
         begin = next(lines)
         roots = [self.root] * bool(self._plan.first) + [_folder(jobs[0])]
@@ -170,6 +172,18 @@ class Shards:
             write_anew(self.root, manifest, pieces, types, merged_encodings(sources), in_place=True)
         except (pa.ArrowException, ValueError, KeyError) as error:
             raise HandrailError(f"{str(self.folder)!r} cannot be read: {message_of(error)}") from error
+
+
+def _in_order(jobs: Sequence[Job], whole: "SimpleQueue[Result | None]") -> Iterator[list[EpisodeRecord]]:
+    """Yield the lines of metadata of every shard, in order, as they are recorded."""
+    found: dict[str, list[EpisodeRecord]] = {}
+    for job in jobs:
+        while job.name not in found:
+            result = whole.get()
+            if result is None:  # recording has ended
+                raise CancelledError
+            found[result.job.name] = result.value[1]
+        yield found.pop(job.name)  # some 50 kB an episode
 
 
 def _folder(job: Job) -> Path:

@@ -25,6 +25,13 @@ class OperatorSpec:
     interactive: bool = False
 
 
+_DEVICES = "handrail.collect.devices.open_devices:open_device"
+
+
+def _device(name: str, help: str) -> OperatorSpec:
+    return OperatorSpec(name, _DEVICES, help, interactive=True)
+
+
 OPERATORS = Registry(
     "operator",
     OperatorSpec,
@@ -40,29 +47,9 @@ OPERATORS = Registry(
             "a person at a browser, with keys, a gamepad or touch",
             interactive=True,
         ),
-        OperatorSpec(
-            "gamepad",
-            "handrail.collect.devices.open_devices:open_device",
-            "a person with a gamepad at this computer",
-            interactive=True,
-        ),
-        OperatorSpec(
-            "spacemouse",
-            "handrail.collect.devices.open_devices:open_device",
-            "a person with a SpaceMouse",
-            interactive=True,
-        ),
-        OperatorSpec(
-            "keyboard",
-            "handrail.collect.devices.open_devices:open_device",
-            "a person with the keys of this terminal",
-            interactive=True,
-        ),
-        OperatorSpec(
-            "leader_arm",
-            "handrail.collect.devices.open_devices:open_leader_arm",
-            "a person with a leader arm of LeRobot's (--teleop.type)",
-            interactive=True,
-        ),
+        _device("gamepad", "a person with a gamepad at this computer"),
+        _device("spacemouse", "a person with a SpaceMouse"),
+        _device("keyboard", "a person with the keys of this terminal"),
+        _device("leader_arm", "a person with a leader arm of LeRobot's (--teleop.type)"),
     ),
 )

@@ -16,9 +16,20 @@ from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene, SceneObject
 from handrail.collect.world.task import Start
 from handrail.controllers.robot.model import RobotModel
+from handrail.datasets.recording.frames import Frame
 
 UP = np.array([0.0, 0.0, 1.0])
 DOWN = np.diag([1.0, -1.0, -1.0])  # tool pointing at the floor
+
+
+class Watcher:
+    """Keeps the frames of an episode; an observer."""
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        self.frames: list[Frame] = []
+
+    def see(self, frame: Frame) -> None:
+        self.frames.append(frame)
 
 
 @contextmanager

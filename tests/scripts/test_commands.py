@@ -71,7 +71,7 @@ WRONG = {
         "--moving_obstacles: expected --task reach, got --task",
     ),
     "both": (["--resume", "--overwrite"], "expected one of them"),
-    "rrd": (["--display_save", "movie.mp4"], "expected a file that ends in .rrd"),
+    "rrd": (["--display_save", "movie.mp4"], "expected a .rrd file in an existing folder"),
 }
 
 

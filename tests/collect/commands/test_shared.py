@@ -11,6 +11,7 @@ from unittest import mock
 import av
 import numpy as np
 import pytest
+from canned import canned
 from command_helpers import command
 from execution_helpers import is_alive
 from shared_helpers import content, saved, started, wait_until, workers_of
@@ -19,14 +20,8 @@ from handrail.collect.commands.shared import Shards
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.datasets.reading.reader import read_info
 
-FLAGS = [
-    "--task",
-    "reach",
-    "--time_limit",
-    "1.0",
-    "--seed",
-    "3",
-]  # a second each: most fail, which is no matter
+# a second each: most fail, which is no matter
+FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3"]
 EPISODES = 15  # three shards
 
 
@@ -37,11 +32,15 @@ def record(root, *flags, episodes=EPISODES):
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory):
+def alone():
     """What one core records."""
-    root = tmp_path_factory.mktemp("alone") / "d"
-    record(root)
-    return content(root)
+    return content(canned(record))
+
+
+def plan(root, first):
+    """Begin to share a recording, without anybody who records."""
+    dataset = DatasetConfig(root=str(root), num_episodes=EPISODES)
+    Shards(RecordConfig(task="reach", time_limit=1.0, seed=3, dataset=dataset)).begin(first)
 
 
 @pytest.mark.parametrize("workers", [2, 3])
@@ -140,11 +139,8 @@ def test_an_interrupt_ends_all_workers_and_one_core_goes_on(number, alone, tmp_p
 
 def test_a_merge_that_was_done_is_not_done_again(alone, tmp_path):
     root, shards = tmp_path / "d", tmp_path / ".d.shards"
-    config = RecordConfig(
-        task="reach", time_limit=1.0, seed=3, dataset=DatasetConfig(root=str(root), num_episodes=EPISODES)
-    )
     record(root, "--workers", "2")
-    Shards(config).begin(first=0)  # as if it was killed before they were removed
+    plan(root, first=0)  # as if it was killed before they were removed
     times = started(root)
     record(root)
     assert started(root) == times
@@ -168,10 +164,7 @@ def test_a_disk_that_is_full_when_the_shards_are_put_together_costs_no_episode(a
 def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
     root, shards = tmp_path / "d", tmp_path / ".d.shards"
     record(root, episodes=2)
-    config = RecordConfig(
-        task="reach", time_limit=1.0, seed=3, dataset=DatasetConfig(root=str(root), num_episodes=EPISODES)
-    )
-    Shards(config).begin(first=1)
+    plan(root, first=1)
     done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES)
     assert done.returncode == 2
     assert "expected 1 episodes, as when" in done.stderr

@@ -1,6 +1,5 @@
 """On a Ray cluster of two computers, both here, jobs give what they give anywhere, also when one is lost."""
 
-import io
 import json
 import os
 import signal
@@ -9,15 +8,10 @@ import sys
 import time
 
 import pytest
+from canned import canned
 from command_helpers import command
-from execution_helpers import dying, noted, refusing, squared, threads
-from ray_helpers import record_with_a_loss, two_computers
-from rich.console import Console
+from ray_helpers import record_with_a_loss
 from shared_helpers import content, saved, started, wait_until
-
-from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.job import TRIES, Job
 
 pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
@@ -25,62 +19,15 @@ EPISODES = 40
 FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3"]
 
 
-@pytest.fixture(scope="module")
-def cluster():
-    with two_computers() as made:
-        yield made
-
-
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """What one core records."""
-    root = tmp_path_factory.mktemp("alone") / "d"
+def record(root):
     done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES)
     assert done.returncode == 0, done.stderr
-    return content(root)
 
 
-def run(jobs, cluster, console=None):
-    with Execution(ExecutionConfig(ray=cluster.address), "jobs", console) as execution:
-        return {result.job.name: result for result in execution.run(jobs)}
-
-
-def test_results_and_failures_are_those_of_any_other_place(cluster, tmp_path):
-    log = tmp_path / "logs" / "refused.log"
-    jobs = [Job(str(number), squared, (number,)) for number in range(12)]
-    jobs += [
-        Job("refused", refusing, ("the disk is full",), log=log),
-        Job("after", squared, (2,), needs=("refused",)),
-        Job("last", noted, (tmp_path, "last"), needs=("11",)),
-        Job("threads", threads),
-    ]
-    said = io.StringIO()
-    found = run(jobs, cluster, Console(file=said, width=300))
-    assert f"failed: refused: the disk is full ({log})" in said.getvalue()
-    assert [found[str(number)].value for number in range(12)] == [number**2 for number in range(12)]
-    assert found["refused"].error == "the disk is full"
-    assert "about to fail" in log.read_text()
-    assert found["after"].error == "what it needs failed"
-    assert found["threads"].value[0] == 1
-    assert not found["last"].error
-
-
-def test_a_killed_worker_s_job_runs_again_but_not_for_ever(cluster, tmp_path):
-    jobs = [
-        Job("dying", dying, (tmp_path, "dying", TRIES - 1, 7)),
-        Job("poison", dying, (tmp_path, "poison", 99)),
-    ]
-    found = run(jobs, cluster)
-    assert found["dying"].value == 7
-    assert f"lost {TRIES} times with its process or computer" in found["poison"].error
-    assert "\n" not in found["poison"].error
-    assert len(list(tmp_path.glob("poison.*"))) == TRIES
-
-
-def test_a_fresh_process_for_each_job(cluster):
-    jobs = [Job(str(number), threads) for number in range(4)]
-    with Execution(ExecutionConfig(ray=cluster.address), "jobs", fresh=True) as execution:
-        assert len({result.value[1] for result in execution.run(jobs)}) == 4
+@pytest.fixture(scope="module")
+def alone():
+    """What one core records."""
+    return content(canned(record))
 
 
 def test_a_computer_that_is_lost_in_the_middle_costs_no_episode_and_makes_none_twice(
@@ -114,8 +61,7 @@ def test_an_interrupt_ends_all_at_once_and_one_core_goes_on(cluster, alone, tmp_
     time.sleep(3.0)  # what would still record would be heard of by now
     assert {path: path.read_bytes() for path in saved(shards)} == kept
     times = {each for path in kept for each in started(path.parents[3])}
-    done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES)
-    assert done.returncode == 0, done.stderr
+    record(root)
     assert content(root) == alone
     assert times <= set(started(root))
 

@@ -27,24 +27,30 @@ from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import TRIES, Job
 from handrail.controllers.errors import HandrailError
 
-EVERYWHERE = [ExecutionConfig(workers=1), ExecutionConfig(workers=2)]
+RAY = pytest.param("ray", marks=[pytest.mark.slow, pytest.mark.filterwarnings("ignore")])
+everywhere = pytest.mark.parametrize("config", [1, 2, RAY], indirect=True)
+elsewhere = pytest.mark.parametrize("config", [2, RAY], indirect=True)
 
 
-def run(jobs, config=ExecutionConfig(workers=1), fresh=False, **settings):  # noqa: B008
+def run(jobs, config=ExecutionConfig(workers=1), fresh=False, said=None, **settings):  # noqa: B008
     """Return what came of jobs, by name, in the order in which they were done."""
-    with Execution(config, "jobs", fresh=fresh) as execution:
+    console = Console(file=said or io.StringIO(), width=300)
+    with Execution(config, "jobs", console, fresh=fresh) as execution:
         return {result.job.name: result for result in execution.run(jobs, **settings)}
 
 
-@pytest.mark.parametrize("workers", [1, 2, 3])
-def test_results_do_not_depend_on_how_many_work(workers):
-    jobs = [Job(str(number), squared, (number,)) for number in range(12)]
-    found = run(jobs, ExecutionConfig(workers=workers))
-    assert {name: result.value for name, result in found.items()} == {str(n): n * n for n in range(12)}
+def values(found):
+    return {name: result.value for name, result in found.items()}
+
+
+@everywhere
+def test_results_do_not_depend_on_who_works(config):
+    found = run([Job(str(number), squared, (number,)) for number in range(12)], config)
+    assert values(found) == {str(n): n * n for n in range(12)}
     assert not any(result.error for result in found.values())
 
 
-@pytest.mark.parametrize("config", EVERYWHERE)
+@everywhere
 def test_a_job_begins_when_what_it_needs_is_done(config, tmp_path):
     jobs = [
         Job("last", noted, (tmp_path, "last"), needs=("middle", "first")),
@@ -54,7 +60,7 @@ def test_a_job_begins_when_what_it_needs_is_done(config, tmp_path):
     assert list(run(jobs, config)) == ["first", "middle", "last"]
 
 
-@pytest.mark.parametrize("config", EVERYWHERE)
+@everywhere
 def test_a_failure_says_why_and_stops_only_what_needs_it(config):
     jobs = [
         Job("refused", refusing, ("the disk is full",)),
@@ -76,7 +82,7 @@ def test_a_failure_says_why_and_stops_only_what_needs_it(config):
     assert found["other"].value == 9
 
 
-@pytest.mark.parametrize("config", EVERYWHERE)
+@everywhere
 def test_what_is_no_longer_wanted_does_not_begin(config, tmp_path):
     jobs = [Job(str(number), noted, (tmp_path, str(number))) for number in range(6)]
     found = run(jobs, config, wanted=lambda job: int(job.name) % 2 == 0)
@@ -94,51 +100,50 @@ def test_the_bar_shows_how_much_is_done_and_what_is_said():
     assert "all well" in said.getvalue()
 
 
-def test_a_killed_worker_s_job_runs_again_and_no_other_does(tmp_path):
+@elsewhere
+def test_a_killed_worker_s_job_runs_again_and_no_other_does(config, tmp_path):
     jobs = [Job(str(number), noted, (tmp_path, str(number), number)) for number in range(8)]
     jobs.insert(3, Job("dying", dying, (tmp_path, "dying", TRIES - 1, 7)))
-    found = run(jobs, ExecutionConfig(workers=2))
-    assert found["dying"].value == 7
-    assert {name: result.value for name, result in found.items() if name != "dying"} == {
-        str(number): number for number in range(8)
-    }
+    found = run(jobs, config)
+    assert values(found) == {str(number): number for number in range(8)} | {"dying": 7}
     times = {job.name: len(list(tmp_path.glob(f"{job.name}.*"))) for job in jobs}
     assert times == {**{str(number): 1 for number in range(8)}, "dying": TRIES}
 
 
-def test_a_job_that_always_kills_its_worker_is_given_up_and_named(tmp_path):
-    said = io.StringIO()
-    console = Console(file=said, width=300)
-    jobs = [Job("poison", dying, (tmp_path, "poison", 99)), Job("fine", squared, (3,))]
-    with Execution(ExecutionConfig(workers=2), "jobs", console) as execution:
-        found = {result.job.name: result for result in execution.run(jobs)}
-    assert f"a worker was killed {TRIES} times while it did this (SIGKILL)" in found["poison"].error
+@elsewhere
+def test_a_job_that_always_kills_its_worker_is_given_up_and_named(config, tmp_path):
+    jobs, said = [Job("poison", dying, (tmp_path, "poison", 99)), Job("fine", squared, (3,))], io.StringIO()
+    found = run(jobs, config, said=said)
+    why = "lost {} times with" if config.ray else "a worker was killed {} times while it did this (SIGKILL)"
+    assert why.format(TRIES) in found["poison"].error
+    assert "\n" not in found["poison"].error
     assert found["fine"].value == 9
     assert len(list(tmp_path.iterdir())) == TRIES
-    assert "failed: poison: a worker was killed" in said.getvalue()
+    assert f"failed: poison: {why.format(TRIES)}" in said.getvalue()
     assert "failed: fine" not in said.getvalue()
 
 
-def test_every_job_has_one_thread_and_the_workers_are_few():
-    found = run([Job(str(number), threads) for number in range(6)], ExecutionConfig(workers=2))
-    assert {result.value[0] for result in found.values()} == {1}
-    assert os.getpid() not in {result.value[1] for result in found.values()}
-    assert len({result.value[1] for result in found.values()}) <= 2
+@elsewhere
+def test_every_job_has_one_thread_and_the_workers_are_few(config):
+    found = values(run([Job(str(number), threads) for number in range(6)], config))
+    assert {most for most, _ in found.values()} == {1}
+    processes = {process for _, process in found.values()}
+    assert os.getpid() not in processes
+    assert len(processes) <= 2
 
 
-def test_a_fresh_process_for_each_job_also_where_there_is_one_worker():
-    found = run([Job(str(number), threads) for number in range(3)], fresh=True)
-    processes = {result.value[1] for result in found.values()}
+@everywhere
+def test_a_fresh_process_for_each_job_also_where_there_is_one_worker(config):
+    found = values(run([Job(str(number), threads) for number in range(3)], config, fresh=True))
+    processes = {process for _, process in found.values()}
     assert len(processes - {os.getpid()}) == 3
-    assert not any(map(is_alive, processes - {os.getpid()}))
+    assert config.ray or not any(map(is_alive, processes))
 
 
-def test_what_a_job_says_is_in_its_log(tmp_path):
-    log = tmp_path / "logs" / "refused.log"
-    said = io.StringIO()
-    console = Console(file=said, width=300)
-    with Execution(ExecutionConfig(workers=2), "jobs", console) as execution:
-        list(execution.run([Job("refused", refusing, ("no",), log=log), Job("ours", broken, log=log)]))
+@elsewhere
+def test_what_a_job_says_is_in_its_log(config, tmp_path):
+    log, said = tmp_path / "logs" / "refused.log", io.StringIO()
+    run([Job("refused", refusing, ("no",), log=log), Job("ours", broken, log=log)], config, said=said)
     assert "about to fail" in log.read_text()
     assert "error: no" in log.read_text()
     assert "Traceback" in log.read_text()

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from collect_helpers import Watcher
 
 from handrail.collect.commands.record import record
 from handrail.collect.commands.recording import episode_seed
@@ -54,14 +55,6 @@ class Person:
         values = np.zeros(self._channels.size)
         values[0] = 0.2
         return Intent(values, self._channels.mask("base"), time=view.state.time)
-
-
-class Watcher:
-    def begin(self, env, seed):
-        self.frames = []
-
-    def see(self, frame):
-        self.frames.append(frame)
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from collect_helpers import action, environment
+from collect_helpers import Watcher, action, environment
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.operator import View
@@ -42,23 +42,12 @@ class Motionless:
         return Intent.idle(Channels.of(MODEL.description), time=view.state.time)
 
 
-class Watcher:
-    def __init__(self):
-        self.states = []
-
-    def begin(self, env, seed):
-        self.states = []
-
-    def see(self, frame):
-        self.states.append(frame.state)
-
-
 def path(env, seed, disturbances=(), controller=None):
     """Return where a robot that nobody steers goes, (T, s); by default one whose servos just hold."""
     watcher = Watcher()
     controller = controller or DirectController(MODEL, 1.0 / env.fps)
     Session(env, controller, Motionless(), (watcher,), disturbances=disturbances).run(seed)
-    return np.array(watcher.states)
+    return np.array([frame.state for frame in watcher.frames])
 
 
 def test_pushes_are_the_seed_s():
@@ -176,6 +165,5 @@ def test_an_operator_sees_what_is_recorded():
     with environment("Reach", task=Reach(horizon=1.0)) as env:
         watcher, operator = Watcher(), Motionless()
         Session(env, DirectController(MODEL), operator, (watcher,)).run(0)
-    for view, state in zip(operator.seen, watcher.states, strict=True):
-        np.testing.assert_array_equal(view.observation["agent_pos"], state)
-        np.testing.assert_array_equal(state[:9], view.state.q.astype(np.float32))
+    for view, frame in zip(operator.seen, watcher.frames, strict=True):
+        np.testing.assert_array_equal(view.observation["agent_pos"], frame.state)

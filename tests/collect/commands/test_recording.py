@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from handrail.collect.commands.account import next_commands
 from handrail.collect.commands.record import record
-from handrail.collect.commands.recording import open_writer, session_writer
-from handrail.collect.commands.target import located, next_commands
+from handrail.collect.commands.recording import located, open_writer, session_writer
 from handrail.collect.config import DatasetConfig, DriveConfig, FoundDatasetConfig, RecordConfig
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
