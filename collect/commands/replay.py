@@ -151,7 +151,7 @@ def replay_one_of(
     states = states[skipped:]
     if not states:
         raise HandrailError(f"{where}: the task ended before the first recorded frame")
-    difference = np.abs(states - recorded[: len(states)])
+    difference = np.abs(np.array(states) - recorded[: len(states)])
     found = Replay(
         episode=episode,
         names=env.agent_names,
