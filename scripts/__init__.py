@@ -19,7 +19,10 @@ def _leave(number: int, frame: FrameType | None) -> NoReturn:
 def _is_command() -> bool:
     """Return whether this process is a command, and no worker of one, nor a program that imports this."""
     name, processes = os.path.basename(sys.argv[0]), sys.modules.get("multiprocessing.process")
-    is_worker = processes is not None and processes.parent_process() is not None
+    # a worker that is being made imports the command's main module before it knows its parent
+    is_worker = processes is not None and (
+        processes.parent_process() is not None or hasattr(processes.current_process(), "_inheriting")
+    )
     return not is_worker and (name in ("-m", "handrail") or name.startswith("handrail-"))
 
 

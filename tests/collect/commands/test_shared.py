@@ -127,6 +127,7 @@ def test_an_interrupt_ends_all_workers_and_one_core_goes_on(number, alone, tmp_p
     _, said = process.communicate(timeout=120)
     assert process.returncode == 130
     assert "interrupted; what was recorded is kept in" in said
+    assert said.count("error:") == 1, said  # the workers say nothing
     assert "Traceback" not in said
     assert workers
     assert not any(map(is_alive, workers))
