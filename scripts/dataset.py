@@ -86,25 +86,21 @@ def compare(config: CompareConfig) -> int:
     """Compare datasets, or people, and write a report; return the exit code."""
     console = Terminal()
     if config.study:
-        from handrail.datasets.comparison.people import compare_people
-        from handrail.datasets.comparison.people_report import write_people_report
+        from handrail.datasets.comparison.people import compare_people, people_report
 
-        people = compare_people(config)
-        tables, cautions, files = people.tables, people.cautions, write_people_report(people)
+        report = people_report(compare_people(config))
     else:
-        from handrail.datasets.comparison import headline
         from handrail.datasets.comparison.compare import compare
-        from handrail.datasets.comparison.page import write_comparison
-        from handrail.datasets.comparison.tables import answer_tables
+        from handrail.datasets.comparison.page import dataset_report
 
-        comparison = compare(config)
-        tables, cautions = answer_tables(comparison), headline.cautions(comparison)
-        files = write_comparison(comparison)
-        console.print(headline.headline(comparison))
+        report = dataset_report(compare(config))
+    files = report.write(config.folder)
+    if report.headline:
+        console.print(report.headline)
         console.print()
-    for table in tables:
+    for table in report.tables:
         console.print(table)
-    for text in cautions:
+    for text in report.cautions:
         console.print(f"! {text}")
     console.print()
     console.print("Written: " + ", ".join(map(str, files)))

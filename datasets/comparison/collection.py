@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,23 +21,15 @@ HOURLY = Measure("successes_an_hour", "successes an operator hour", RATIO)
 
 @dataclass(frozen=True)
 class Collected:
-    """One group.
-
-    Attributes:
-        successes: How many succeeded; None where success was not recorded for all.
-        success_interval: Wilson, 95 %.
-        operator_time: Of all episodes, failures included: frames over frames a second [s]. Resets between
-            episodes are not recorded.
-        reasons: Why episodes failed, and how many of each.
-    """
+    """The numbers of one group."""
 
     label: str
     episodes: int
-    successes: int | None
-    success_interval: Interval | None
-    operator_time: float
+    successes: int | None  # None where success was not recorded for all
+    success_interval: Interval | None  # Wilson, 95 %
+    operator_time: float  # of all episodes, failures included, without the resets between them [s]
     frames: int
-    reasons: Mapping[str, int]
+    reasons: Mapping[str, int]  # of failures, and how many of each
 
     @property
     def success(self) -> float | None:
@@ -50,21 +43,17 @@ class Collected:
 
 
 def collected(group: Group) -> Collected:
-    """Return what a group consists of."""
+    """Return the numbers of a group."""
     results = [episode.success for episode in group.episodes]
-    known = all(result is not None for result in results)
-    successes = sum(map(bool, results)) if known else None
-    reasons = Counter(
-        str(episode.meta.get("failure_reason") or "not recorded")
-        for episode in group.episodes
-        if episode.success is False
-    )
+    successes = None if None in results else sum(map(bool, results))
+    failed = (episode for episode in group.episodes if episode.success is False)
+    reasons = Counter(str(each.meta.get("failure_reason") or "not recorded") for each in failed)
     return Collected(
         label=group.label,
-        episodes=len(group.episodes),
+        episodes=len(results),
         successes=successes,
         success_interval=None if successes is None else wilson(successes, len(results)),
-        operator_time=sum(episode.seconds for episode in group.episodes),
+        operator_time=group.seconds,
         frames=sum(episode.count for episode in group.episodes),
         reasons=dict(reasons.most_common()),
     )
@@ -76,10 +65,10 @@ def shared_seeds(one: Group, other: Group) -> list[tuple[int, int]]:
     Two episodes begin alike if task sentences and seed are the same. Seeds must be unique in each group. With
     only some of them paired, what is compared would not be what is shown.
     """
-    places = [_starts(group) for group in (one, other)]
-    if len(one.episodes) < 2 or places[0].keys() != places[1].keys():
+    starts, others = _starts(one), _starts(other)
+    if len(one.episodes) < 2 or starts.keys() != others.keys():
         return []
-    return [(place, places[1][key]) for key, place in places[0].items()]
+    return [(place, others[key]) for key, place in starts.items()]
 
 
 def _starts(group: Group) -> dict[tuple[str, int], int]:
@@ -92,17 +81,22 @@ def _starts(group: Group) -> dict[tuple[str, int], int]:
 
 def success_difference(group: Group, baseline: Group) -> Contrast:
     """Return how success in collection differs from the baseline's."""
-    names = {"measure": SUCCESS, "label": group.label, "baseline": baseline.label}
-    names |= {"scope": COLLECTING, "family": SUCCESS.title}
+    names = _names(SUCCESS, group, baseline)
     results = [[episode.success for episode in each.episodes] for each in (group, baseline)]
-    if any(result is None for each in results for result in each):
+    if any(None in each for each in results):
         return Contrast(**names, reason="success was not recorded for all")
-    one, other = [list(map(bool, each)) for each in results]
-    if pairs := shared_seeds(group, baseline):
-        return Contrast(
-            **names, **vars(paired_shares([one[i] for i, _ in pairs], [other[j] for _, j in pairs]))
-        )
-    return Contrast(**names, **vars(unpaired_shares(one, other)))
+    one, other = (list(map(bool, each)) for each in results)
+    pairs = shared_seeds(group, baseline)
+    if pairs:
+        found = paired_shares([one[i] for i, _ in pairs], [other[j] for _, j in pairs])
+    else:
+        found = unpaired_shares(one, other)
+    return Contrast(**names, **vars(found))
+
+
+def _names(measure: Measure, group: Group, baseline: Group) -> dict[str, Any]:
+    names = {"measure": measure, "label": group.label, "baseline": baseline.label}
+    return names | {"scope": COLLECTING, "family": measure.title}
 
 
 def matched_number(groups: Sequence[Group]) -> list[Group]:
@@ -113,7 +107,7 @@ def matched_number(groups: Sequence[Group]) -> list[Group]:
 
 def matched_time(groups: Sequence[Group]) -> list[Group]:
     """Return the first episodes of each group that fit into the shortest group's operator time."""
-    seconds = min(sum(episode.seconds for episode in group.episodes) for group in groups)
+    seconds = min(group.seconds for group in groups)
     return [group.within(seconds) for group in groups]
 
 
@@ -130,32 +124,31 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> Contr
 
     Σ success / Σ time of one over that of the other, episodes resampled, as pairs where all began alike.
     """
-    names = {"measure": HOURLY, "label": group.label, "baseline": baseline.label, "null": 1.0}
-    names |= {"scope": COLLECTING, "family": HOURLY.title}
+    names = _names(HOURLY, group, baseline)
     pairs, counts = shared_seeds(group, baseline), (len(group.episodes), len(baseline.episodes))
     numbers = [_numbers(group), _numbers(baseline)]
     if min(counts) < FEWEST or not all(np.isfinite(s).all() and s.any() for s, _ in numbers):
-        return Contrast(**names, reason="too few episodes, or none that is known to have succeeded")
+        return Contrast(**names, null=1.0, reason="too few episodes, or none that is known to have succeeded")
     successes, seconds = (np.concatenate(each) for each in zip(*numbers, strict=True))
     places = np.arange(counts[0]), counts[0] + np.arange(counts[1])
     if pairs:
         places = np.array([i for i, _ in pairs]), counts[0] + np.array([j for _, j in pairs])
 
-    def rates(chosen: Sequence[IntArray], axis: int) -> list[FloatArray]:
+    def rates(*chosen: IntArray, axis: int = -1) -> list[FloatArray]:
         return [_rate(successes[each], seconds[each], axis) for each in chosen]
 
     def share(*chosen: IntArray, axis: int = -1) -> FloatArray:
-        one, other = rates(chosen, axis)
+        one, other = rates(*chosen, axis=axis)
         return np.divide(one, one + other, out=np.full_like(one, 0.5), where=one + other > 0)
 
     def difference(*chosen: IntArray, axis: int = -1) -> FloatArray:
-        one, other = rates(chosen, axis)
-        return one - other
+        return np.subtract(*rates(*chosen, axis=axis))
 
     low, high = bootstrap(places, share, bool(pairs), rng)  # of both, which is finite even without successes
-    one, other = rates(places, -1)
+    one, other = rates(*places)
     return Contrast(
         **names,
+        null=1.0,
         estimate=float(one / other),
         interval=(low * _over(1.0 - low), high * _over(1.0 - high)),
         p=permutation_p(places, difference, bool(pairs), rng),
@@ -165,7 +158,7 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> Contr
 
 
 def _numbers(group: Group) -> tuple[FloatArray, FloatArray]:
-    """Return success, NaN where unknown, and duration [s] of every episode."""
+    """Return success, NaN where it is not known, and duration [s] of every episode."""
     successes = [np.nan if e.success is None else float(e.success) for e in group.episodes]
     return np.array(successes), np.array([e.seconds for e in group.episodes])
 

@@ -6,68 +6,44 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.collection import (
-    Collected,
-    collected,
-    matched_number,
-    matched_time,
-    rate_interval,
-    rate_ratio,
-    success_difference,
-)
+from handrail.datasets.comparison import collection
+from handrail.datasets.comparison.collection import Collected, matched_number, matched_time
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.episodes import MetricContrast, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.policies import Outcomes, judge_pairs, pairs_between
+from handrail.datasets.presentation.drawing import COLOURS
 from handrail.datasets.quality.measure import Measurements, measure_views
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.resampling import Interval
 
 ALL = "all episodes"
-_SAME_NUMBER = "the same number of episodes"
+_SAME_NUMBER, _SAME_TIME = "the same number of episodes", "the same operator time"
 
 
 @dataclass(frozen=True)
 class EpisodeChoice:
-    """One way to choose the episodes that are compared.
-
-    Attributes:
-        title: What is held equal.
-        groups: The episodes chosen.
-        collected: What they consist of; failures are counted even where quality is measured without.
-        measurements: Of their quality.
-        differences: Of every metric, each group against the baseline.
-    """
+    """One way to choose the episodes that are compared; the title says what is held equal."""
 
     title: str
-    groups: Sequence[Group]
-    collected: Sequence[Collected]
+    groups: Sequence[Group]  # of which quality was measured
+    collected: Sequence[Collected]  # failures are counted even where quality is measured without
     measurements: Measurements
-    differences: Sequence[MetricContrast]
+    differences: Sequence[MetricContrast]  # of every metric, each group against the baseline
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was found.
-
-    Attributes:
-        baseline: The label that the others are compared with.
-        views: All episodes, as many of each, as much operator time of each.
-        success: In collection, each group against the baseline, by label.
-        rates: Each group's interval of successes an hour, None where it cannot be told.
-        ratios: Successes an hour of each group over those of the baseline.
-        outcomes: Of trained policies, if evaluations were given.
-    """
+    """The result of a comparison of datasets."""
 
     config: CompareConfig
-    baseline: str
-    views: Sequence[EpisodeChoice]
-    success: Mapping[str, Contrast]
-    rates: Mapping[str, Interval | None]
-    ratios: Mapping[str, Contrast]
-    outcomes: Outcomes | None
+    baseline: str  # label that the others are compared with
+    views: Sequence[EpisodeChoice]  # all episodes, as many of each, as much operator time of each
+    collecting: Sequence[Contrast]  # success, then successes an hour, of each group against the baseline
+    rates: Mapping[str, Interval | None]  # of successes an hour of each group
+    outcomes: Outcomes | None  # of trained policies, if evaluations were given
 
     @property
     def everything(self) -> EpisodeChoice:
@@ -80,20 +56,29 @@ class Comparison:
         return [group.label for group in self.everything.groups]
 
     @property
+    def others(self) -> list[str]:
+        """Labels but the baseline."""
+        return [label for label in self.labels if label != self.baseline]
+
+    @property
     def unlike(self) -> tuple[str, ...]:
         """What differs so that nothing is ranked: tasks, robots."""
         return unlike(self.everything.groups)
 
     @property
-    def metric_contrasts(self) -> list[MetricContrast]:
-        """Differences of every metric in every view."""
-        return [each for view in self.views for each in view.differences]
+    def colours(self) -> dict[str, str]:
+        """A colour for each group, and each condition of policies that belongs to it."""
+        found: dict[str, str] = dict(zip(self.labels, COLOURS, strict=False))
+        for condition in self.outcomes.conditions if self.outcomes else ():
+            found.setdefault(condition.label, found[group_of(condition.label, self.labels)])
+        return found
 
     @property
     def contrasts(self) -> list[Contrast]:
         """All that is compared."""
         policies = self.outcomes.differences if self.outcomes else ()
-        return [*policies, *self.success.values(), *self.ratios.values(), *self.metric_contrasts]
+        metrics = [each for view in self.views for each in view.differences]
+        return [*policies, *self.collecting, *metrics]
 
 
 def compare(config: CompareConfig) -> Comparison:
@@ -106,26 +91,21 @@ def compare(config: CompareConfig) -> Comparison:
     conditions = _conditions(config, groups)
     pairs = pairs_between(list(conditions), baseline, [group.label for group in groups])
     rng = np.random.default_rng(config.seed)
-    chosen = {
-        ALL: groups,
-        _SAME_NUMBER: matched_number(groups),
-        "the same operator time": matched_time(groups),
-    }
+    chosen = {ALL: groups, _SAME_NUMBER: matched_number(groups), _SAME_TIME: matched_time(groups)}
     counted = {title: _counted(title, each, config) for title, each in chosen.items()}
     episodes = [{group.label: group.episodes for group in each} for each in counted.values()]
     views = []
     for title, measurements in zip(chosen, measure_views(episodes, rng, config.margin), strict=True):
         found = differences(title, counted[title], measurements, baseline, rng)
-        numbers = [collected(group) for group in chosen[title]]
+        numbers = [collection.collected(group) for group in chosen[title]]
         views.append(EpisodeChoice(title, counted[title], numbers, measurements, found))
     (base,) = [group for group in groups if group.label == baseline]
     others = [group for group in groups if group is not base]
-    success = adjusted(success_difference(group, base) for group in others)
-    rates = {group.label: rate_interval(group, rng) for group in groups}
-    ratios = adjusted([rate_ratio(group, base, rng) for group in others])
+    success = [collection.success_difference(group, base) for group in others]
+    rates = {group.label: collection.rate_interval(group, rng) for group in groups}
+    ratios = [collection.rate_ratio(group, base, rng) for group in others]
     outcomes = judge_pairs(conditions, pairs, rng) if conditions else None
-    by_label = [{each.label: each for each in found} for found in (success, ratios)]
-    return Comparison(config, baseline, views, by_label[0], rates, by_label[1], outcomes)
+    return Comparison(config, baseline, views, adjusted([*success, *ratios]), rates, outcomes)
 
 
 def _counted(title: str, groups: Sequence[Group], config: CompareConfig) -> list[Group]:
@@ -134,9 +114,7 @@ def _counted(title: str, groups: Sequence[Group], config: CompareConfig) -> list
     for group in counted:
         if not group.episodes:
             raise HandrailError(f"--success_only: {group.label!r} has no successful episode among {title}")
-    if title == _SAME_NUMBER:  # of those that count; as many were collected
-        return matched_number(counted)
-    return counted
+    return matched_number(counted) if title == _SAME_NUMBER else counted
 
 
 def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Condition]:

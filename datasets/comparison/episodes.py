@@ -1,7 +1,7 @@
 """How a metric differs between two groups, with and without the length of the episodes taken into account."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.collection import shared_seeds
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.measure import Measured, Measurements
+from handrail.datasets.quality.measure import Measurements
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.resampling import (
@@ -24,7 +24,6 @@ from handrail.datasets.statistics.resampling import (
 
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
 _NO_SPREAD = 1e-9  # of a value: a standard deviation below is rounding
-_TOO_FEW = f"fewer than {FEWEST} episodes of a group have a value"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,21 +32,14 @@ class MetricContrast(Contrast):
 
     A metric whose unit is the dataset has an estimate alone: the values of its episodes share neighbours, and
     resampling would take them for independent.
-
-    Attributes:
-        incomparable: The reason, where both have values whose units are not known to be the same.
-        spread: Standard deviation within groups, pooled.
-        at_length: The estimate with the metric's linear dependence on length, within groups, taken off.
-        at_length_interval: 95 %, bootstrap.
-        follows_length: Spearman's ρ with episode length within groups.
     """
 
     measure: Metric
-    incomparable: str = ""
-    spread: float | None = None
-    at_length: float | None = None
-    at_length_interval: Interval | None = None
-    follows_length: float | None = None
+    incomparable: str = ""  # why the units of both are not known to be the same, where both have values
+    spread: float | None = None  # standard deviation within groups, pooled
+    at_length: float | None = None  # estimate without the linear dependence on length, within groups
+    at_length_interval: Interval | None = None  # 95 %, bootstrap
+    follows_length: float | None = None  # Spearman's ρ with episode length within groups
 
     @property
     def tested(self) -> bool:
@@ -55,13 +47,10 @@ class MetricContrast(Contrast):
         return self.interval is not None
 
     @property
-    def effect(self) -> tuple[float, float, float]:
+    def effect(self) -> tuple[float, ...]:
         """Estimate and interval in standard deviations; infinite for a difference where nothing varies."""
-        estimate, low, high = (
-            _in_spreads(each, self.spread or 0.0)
-            for each in (self.estimate or 0.0, *(self.interval or (0, 0)))
-        )
-        return estimate, low, high
+        values = (self.estimate or 0.0, *(self.interval or (0, 0)))
+        return tuple(_in_spreads(each, self.spread or 0.0) for each in values)
 
     @property
     def at_equal_length(self) -> bool:
@@ -83,60 +72,54 @@ def differences(
 
     Args:
         scope: Of which episodes.
-        groups: What was measured.
+        groups: Which were measured.
         measurements: Of these groups.
         baseline: The label that the others are compared with.
         rng: Of the resampling.
     """
     (base,) = [group for group in groups if group.label == baseline]
-    others = [group for group in groups if group.label != baseline]
-    found = [_difference(metric, group, base, measurements, rng) for group in others for metric in METRICS]
-    return adjusted(replace(each, scope=scope, family=f"metrics, {scope}") for each in found)
+    found = []
+    for group in (group for group in groups if group is not base):
+        for metric in METRICS:
+            numbers = _difference(metric, group, base, measurements, rng)
+            numbers |= {"label": group.label, "baseline": baseline}
+            numbers |= {"scope": scope, "family": f"metrics, {scope}"}
+            found.append(MetricContrast(measure=metric, **numbers))
+    return adjusted(found)
 
 
 def _difference(
     metric: Metric, group: Group, base: Group, measurements: Measurements, rng: np.random.Generator
-) -> MetricContrast:
-    measured = [measurements.values[metric.name][each.label] for each in (group, base)]
-    found = MetricContrast(measure=metric, label=group.label, baseline=base.label)
+) -> dict[str, Any]:
+    """Return the numbers of a contrast, or why there are none."""
+    one, other = measured = [measurements.values[metric.name][each.label] for each in (group, base)]
     for each, values in zip((group, base), measured, strict=True):
         if values.mean is None:
-            return replace(found, reason=f"{each.label}: {values.reason}")
-    apart = measurements.why_not(metric, group.label, base.label)
-    if apart:
-        return replace(found, reason=f"not comparable: {apart}", incomparable=apart)
-    one, other = (np.isfinite(each.values) for each in measured)
-    if min(one.sum(), other.sum()) < FEWEST:
-        return replace(found, reason=_TOO_FEW)
+            return {"reason": f"{each.label}: {values.reason}"}
+    if apart := measurements.why_not(metric, group.label, base.label):
+        return {"reason": f"not comparable: {apart}", "incomparable": apart}
+    known, counts = [np.isfinite(each.values) for each in measured], (len(one.known), len(other.known))
+    pairs = [(i, j) for i, j in shared_seeds(group, base) if known[0][i] and known[1][j]]
+    chosen = np.array(pairs).T if pairs else list(map(np.flatnonzero, known))
+    if min(*counts, *(() if metric.of_dataset else map(len, chosen))) < FEWEST:
+        return {"reason": f"fewer than {FEWEST} episodes of a group have a value"}
     if metric.of_dataset:
-        return _described(found, *measured)
-    pairs = [(i, j) for i, j in shared_seeds(group, base) if one[i] and other[j]]
-    chosen = np.array(pairs).T if pairs else (np.flatnonzero(one), np.flatnonzero(other))
-    if min(map(len, chosen)) < FEWEST:
-        return replace(found, reason=_TOO_FEW)
+        if len(one.values) != len(other.values):
+            return {"reason": "it depends on the number of episodes: see the same number"}
+        estimate = float(np.nanmean(one.values) - np.nanmean(other.values))
+        return {"estimate": estimate, "counts": counts}
     values = [each.values[places] for each, places in zip(measured, chosen, strict=True)]
     seconds = [np.array([episode.seconds for episode in each.episodes]) for each in (group, base)]
     lengths = [each[places] for each, places in zip(seconds, chosen, strict=True)]
-    return replace(found, **_compared(values, lengths, bool(pairs), rng))
-
-
-def _described(found: MetricContrast, one: Measured, other: Measured) -> MetricContrast:
-    """Return how a measure of whole datasets differs, where they have as many episodes."""
-    if len(one.values) != len(other.values):
-        return replace(found, reason="it depends on the number of episodes: see the same number")
-    estimate = float(np.nanmean(one.values) - np.nanmean(other.values))
-    return replace(found, estimate=estimate, counts=(len(one.known), len(other.known)))
+    return _compared(values, lengths, bool(pairs), rng)
 
 
 def _compared(
     values: Sequence[FloatArray], lengths: Sequence[FloatArray], paired: bool, rng: np.random.Generator
 ) -> dict[str, Any]:
-    def at_length(first: IntArray, second: IntArray, axis: int = -1) -> FloatArray:
-        chosen = (first, second)
-        return at_equal_length(
-            [each[places] for each, places in zip(values, chosen, strict=True)],
-            [each[places] for each, places in zip(lengths, chosen, strict=True)],
-        )
+    def at_length(*chosen: IntArray, axis: int = -1) -> FloatArray:
+        sides = ([each[at] for each, at in zip(side, chosen, strict=True)] for side in (values, lengths))
+        return at_equal_length(*sides)
 
     one, other = values
     places = np.arange(len(one)), np.arange(len(other))
@@ -154,16 +137,10 @@ def _compared(
 
 
 def at_equal_length(values: Sequence[FloatArray], lengths: Sequence[FloatArray]) -> FloatArray:
-    """Return differences of means at equal length: ȳ₁ − ȳ₂ − β (L̄₁ − L̄₂), β the slope within groups.
+    """Return differences of means at equal length: ȳ₁ − ȳ₂ − β (L̄₁ − L̄₂), β the slope within groups, `(…)`.
 
-    β = Σ_g Σ (L − L̄_g)(y − ȳ_g) / Σ_g Σ (L − L̄_g)²: the analysis of covariance.
-
-    Args:
-        values: Of two groups, `(…, N)` and `(…, M)`.
-        lengths: Of the same episodes.
-
-    Returns:
-        `(…)`.
+    β = Σ_g Σ (L − L̄_g)(y − ȳ_g) / Σ_g Σ (L − L̄_g)²: the analysis of covariance. Values and lengths are of
+    the episodes of two groups, `(…, N)` and `(…, M)`.
     """
     (one, one_length), (other, other_length) = [
         (y.mean(axis=-1), length.mean(axis=-1)) for y, length in zip(values, lengths, strict=True)

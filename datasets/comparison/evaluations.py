@@ -60,19 +60,12 @@ _Policies = Annotated[list[_Policy], Meta(min_length=1)]
 
 @dataclass(frozen=True)
 class Policy:
-    """One trained policy and what it did.
+    """One trained policy and its rollouts."""
 
-    Attributes:
-        draw: Which draw of the dataset it was trained on.
-        training_seed: Of its training.
-        trained_on: Numbers about the data, such as `episodes` and `operator_time`.
-        rollouts: Lines of the file, by evaluation seed.
-    """
-
-    draw: int
+    draw: int  # of the dataset
     training_seed: int
-    trained_on: Mapping[str, float]
-    rollouts: Mapping[int, Rollout]
+    trained_on: Mapping[str, float]  # numbers about the data, such as `episodes` and `operator_time`
+    rollouts: Mapping[int, Rollout]  # lines of the file, by evaluation seed
 
     def run(self, outcome: str = SUCCESS) -> Run:
         """Return one outcome of all rollouts."""

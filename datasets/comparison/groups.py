@@ -2,12 +2,14 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.reading.columns import ColumnNames
+from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.episode import Episode
 from handrail.datasets.reading.load import each_opened, recorded_episodes
 from handrail.datasets.reading.reader import DatasetInfo, read_info
@@ -17,13 +19,7 @@ FEWEST, MOST = 2, 8
 
 @dataclass(frozen=True)
 class Group:
-    """Episodes that belong together.
-
-    Attributes:
-        label: Its name in the report.
-        info: What the dataset is.
-        episodes: In the order in which they were recorded.
-    """
+    """Episodes of one dataset that belong together, in the order in which they were recorded."""
 
     label: str
     info: DatasetInfo
@@ -34,51 +30,49 @@ class Group:
         """Task sentences of the episodes, in order of the alphabet."""
         return tuple(sorted({task for episode in self.episodes for task in episode.meta["tasks"]}))
 
+    @property
+    def seconds(self) -> float:
+        """The operator's time [s]."""
+        return sum(episode.seconds for episode in self.episodes)
+
     def first(self, count: int) -> "Group":
         """Return the first episodes only."""
-        return Group(self.label, self.info, self.episodes[:count])
+        return replace(self, episodes=self.episodes[:count])
 
     def within(self, seconds: float) -> "Group":
         """Return the first episodes that fit into an operator's time [s], one at least."""
-        total, count = 0.0, 0
-        for episode in self.episodes:
-            total += episode.seconds
-            if total > seconds * (1.0 + 1e-9):
-                break
-            count += 1
-        return self.first(max(1, count))
+        ends = np.cumsum([episode.seconds for episode in self.episodes])
+        return self.first(max(1, int(np.searchsorted(ends, seconds * (1.0 + 1e-9), side="right"))))
 
     def successful(self) -> "Group":
         """Return the episodes that are not known to have failed."""
-        return Group(self.label, self.info, tuple(e for e in self.episodes if e.success is not False))
+        return replace(self, episodes=tuple(each for each in self.episodes if each.success is not False))
 
 
 def load_groups(
     roots: Sequence[str | Path], by: str = "", labels: Sequence[str] = (), columns: ColumnNames | None = None
 ) -> list[Group]:
-    """Return what is to be compared.
+    """Return the groups of LeRobot v3.0 datasets.
 
     Args:
-        roots: Folders of LeRobot v3.0 datasets.
-        by: Split each dataset by this column of its episodes' metadata, such as `mode`, `operator` or
-            `success`; "" compares whole datasets.
+        roots: Folders of the datasets.
+        by: Split each by this column of its episodes' metadata, such as `mode`, `operator` or `success`.
         labels: A name for each dataset; their folders' names when empty.
         columns: Which column plays which part.
     """
-    names = _names(roots, labels)
     groups: list[Group] = []
-    for root, name in zip(roots, names, strict=True):
+    for root, name in zip(roots, _names(roots, labels), strict=True):
         info, episodes = read_info(root), recorded_episodes(root, columns)
         if not episodes:
             raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
-        if not by:
-            groups.append(Group(name, info, tuple(episodes)))
-            continue
         prefix = f"{name} · " if len(roots) > 1 else ""
-        values = _values(episodes, by, str(root))
-        for each in dict.fromkeys(values):
-            members = (episode for episode, value in zip(episodes, values, strict=True) if value == each)
-            groups.append(Group(prefix + each, info, tuple(members)))
+        values = (
+            [prefix + value for value in _values(episodes, by, str(root))] if by else [name] * len(episodes)
+        )
+        members: dict[str, list[Episode]] = {}
+        for episode, value in zip(episodes, values, strict=True):
+            members.setdefault(value, []).append(episode)
+        groups += [Group(label, info, tuple(each)) for label, each in members.items()]
     if not FEWEST <= len(groups) <= MOST:
         found = ", ".join(group.label for group in groups) or "none"
         advice = "" if by else "; name another dataset, or say --by mode"
@@ -100,6 +94,12 @@ def group_of(condition: str, labels: Sequence[str]) -> str:
     return max(known, key=len, default="")
 
 
+def unlike(groups: Sequence[Group]) -> tuple[str, ...]:
+    """Return which of tasks and robots differ: then no difference can be laid to how they were recorded."""
+    read = {"tasks": [each.tasks for each in groups], "robots": [each.info.robot_type for each in groups]}
+    return tuple(name for name, found in read.items() if len(set(found)) > 1)
+
+
 def _names(roots: Sequence[str | Path], labels: Sequence[str]) -> list[str]:
     if labels and len(labels) != len(roots):
         raise HandrailError(f"--labels: expected {len(roots)} names, got {len(labels)}")
@@ -115,28 +115,17 @@ def _names(roots: Sequence[str | Path], labels: Sequence[str]) -> list[str]:
 
 def _values(episodes: Sequence[Episode], by: str, root: str) -> list[str]:
     """Return the values of a metadata column; modes that the metadata lacks are read from the frames."""
-    if by == "mode" and not all(by in episode.meta for episode in episodes):
-        opened = each_opened(episodes)
-        return [
-            episode.modes or "none"
-            if by not in episode.meta and episode.has("mode")
-            else _value(episode, by, root)
-            for episode in opened
-        ]
-    return [_value(episode, by, root) for episode in episodes]
+    missing = by == "mode" and not all(by in episode.meta for episode in episodes)
+    return [_value(episode, by, root) for episode in (each_opened(episodes) if missing else episodes)]
 
 
 def _value(episode: Episode, by: str, root: str) -> str:
-    meta: dict[str, Any] = {key: value for key, value in episode.meta.items() if "/" not in key}
-    if by not in meta:
-        raise HandrailError(
-            f"dataset {root!r}: unknown column {by!r} of episodes, expected one of {', '.join(meta)}"
-        )
-    value = meta[by]
-    return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-def unlike(groups: Sequence[Group]) -> tuple[str, ...]:
-    """Return which of tasks and robots differ: then no difference can be laid to how they were recorded."""
-    read = {"tasks": [each.tasks for each in groups], "robots": [each.info.robot_type for each in groups]}
-    return tuple(name for name, found in read.items() if len(set(found)) > 1)
+    known = [name for name in episode.meta if "/" not in name]
+    if by in known:
+        value = episode.meta[by]
+        return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+    if isinstance(episode, Demonstration) and by == "mode" and episode.has("mode"):
+        return episode.modes or "none"
+    raise HandrailError(
+        f"dataset {root!r}: unknown column {by!r} of episodes, expected one of {', '.join(known)}"
+    )

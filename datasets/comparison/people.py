@@ -3,6 +3,7 @@
 Participants are what is resampled: a difference is taken within each of them.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,45 +14,38 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import unknown_name
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.report import (
-    contrast_table,
-    measure_cell,
-    shown,
-    shown_interval,
-)
+from handrail.datasets.comparison.report import Report, contrast_table, measure_cell, shown
 from handrail.datasets.comparison.scores import SCORES
 from handrail.datasets.comparison.user_study import (
     MEASURES,
     StudyData,
     Trial,
     form_trials,
-    is_known,
     read_study,
     read_trials,
 )
-from handrail.datasets.presentation.table import Cell, Table
+from handrail.datasets.presentation.markup import paragraph
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.contrast import LEVEL, Contrast, Estimate, Measure, adjusted
-from handrail.datasets.statistics.resampling import (
-    FEWEST,
-    bootstrap_mean,
-    difference_of_means,
-    permutation_p,
-)
+from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, difference_of_means, permutation_p
 
+FORMAT = "handrail.people/2"
 FORMS = "workload and usability"
-_TOO_FEW = f"Participants: {{}}. Intervals and tests need {FEWEST} or more, so there are none."
-_BLIND = "Participants: {}. Too few to detect any difference in some tables; the intervals describe it."
+_MEANS = "Means over participants; 95 % below, by resampling participants; n: who has a value, of all."
+_CONTRASTS = "Differences within participants; p after Holm over this table; bold: detected."
 _SCRIPTED = (
     "Scripted operators stand beside the people, over their own episodes: they are not paired with them, and"
     " nothing is tested between the two."
 )
 _ALONE = "In some tasks people drove no other condition beside the baseline: there is nothing to compare."
-_NO_SCORES = "No scores yet: exports/scores.csv is not there."
-_STRANGERS = "Participants with scores and without an episode: {}."
-_LEFT_OUT = "Episodes that name neither a participant nor a script, and are left out: {}."
-_MEANS = "Means over participants; 95 % below, by resampling participants; n: who has a value, of all."
-_CONTRASTS = "Differences within participants; p after Holm over this table; bold: detected."
+_HOW = (
+    "A participant's value is the mean over their episodes of a task in a condition. A difference is taken"
+    " within each participant, over the scenes that they met under both conditions, else of their means; then"
+    " the mean over participants. Intervals are 95 %, by a bootstrap that resamples participants. p:"
+    " permutation of the signs of the participants' differences, exact where there are few, adjusted by Holm"
+    " over each table. A difference is detected if its interval leaves zero out and p stays below 0.05."
+)
 
 Scenes = Mapping[int | None, Sequence[float]]  # values by scene
 OfPeople = Mapping[str, Scenes]  # by participant
@@ -59,72 +53,58 @@ OfPeople = Mapping[str, Scenes]  # by participant
 
 @dataclass(frozen=True, kw_only=True)
 class Mean(Estimate):
-    """A measure under one condition.
-
-    Attributes:
-        scripted: Whether scripted operators steered; then an episode counts as a participant does.
-        total: Participants (or scripted episodes) there are; `counts` has those with a value.
-    """
+    """A measure under one condition; of scripted operators an episode counts as a participant does."""
 
     label: str
     scripted: bool
-    total: int
+    total: int  # participants (or scripted episodes) there are; `counts` has those with a value
 
     @property
     def content(self) -> dict[str, Any]:
-        """What the JSON has."""
+        """Its entry in the JSON."""
         named = {"label": self.label, "scripted": self.scripted, "count": self.counts[0], "total": self.total}
         return named | {"mean": self.estimate, "interval": self.interval}
 
 
 @dataclass(frozen=True)
 class PeoplePart:
-    """A task, or the forms.
-
-    Attributes:
-        measures: What was measured.
-        means: Of each measure, by its name: people's conditions first, then scripted operators'.
-        contrasts: Of every measure, each condition against the baseline; people only.
-    """
+    """A task, or the forms."""
 
     title: str
     measures: Sequence[Measure]
-    means: dict[str, list[Mean]]
-    contrasts: list[Contrast]
+    means: dict[str, list[Mean]]  # by measure: people's conditions first, then scripted operators'
+    contrasts: list[Contrast]  # of every measure, each condition against the baseline; people only
+
+    def tables(self, baseline: str, note: str) -> list[Table]:
+        """Return the table of means, and that of the differences if there are any."""
+        (first, *_) = self.means.values()
+        labels = [f"{mean.label}, scripted" if mean.scripted else mean.label for mean in first]
+        rows = [
+            [measure_cell(each), *(_cell(mean, each) for mean in self.means[each.name])]
+            for each in self.measures
+        ]
+        columns = ("measure", "group", "difference", "95 %", "p, Holm", "n")
+        title = f"{note}{self.title}: against {baseline}, paired by participant"
+        differences = contrast_table(self.contrasts, columns, title, _CONTRASTS)
+        means = Table(("", *labels), rows, f"{note}{self.title}", _MEANS)
+        return [means, differences] if self.contrasts else [means]
+
+
+def _cell(mean: Mean, measure: Measure) -> Any:
+    return shown(measure, mean.estimate, mean.interval, f"n = {mean.counts[0]} of {mean.total}")
 
 
 @dataclass(frozen=True)
 class PeopleComparison:
-    """What was found.
-
-    Attributes:
-        baseline: The condition that the others are compared with.
-        participants: Everyone who has an episode.
-        trials: Every episode.
-        parts: A task each, and the forms last.
-        cautions: What a reader has to know.
-    """
+    """The result of a comparison of people."""
 
     config: CompareConfig
     study: StudyData
-    baseline: str
-    participants: Sequence[str]
+    baseline: str  # condition that the others are compared with
+    participants: Sequence[str]  # everyone who has an episode
     trials: Sequence[Trial]
-    parts: Sequence[PeoplePart]
+    parts: Sequence[PeoplePart]  # a task each, and the forms last
     cautions: Sequence[str]
-
-    @property
-    def tables(self) -> list[Table]:
-        """The tables of every part: means, then differences."""
-        note = f"{self.study.source}. " if self.study.demo else ""
-        found = []
-        for part in self.parts:
-            found.append(_means_table(part, note))
-            if part.contrasts:
-                title = f"{note}{part.title}: against {self.baseline}, paired by participant"
-                columns = ("measure", "group", "difference", "95 %", "p, Holm", "n")
-                found.append(contrast_table(part.contrasts, columns, title, _CONTRASTS))
-        return found
 
 
 def compare_people(config: CompareConfig) -> PeopleComparison:
@@ -164,7 +144,7 @@ def compared(
 
     Args:
         title: Of the part: a task, or the forms.
-        measures: What was measured.
+        measures: Which.
         trials: Of the part.
         labels: Of the conditions under which people drove.
         baseline: The condition that the others are compared with.
@@ -175,38 +155,36 @@ def compared(
     means: dict[str, list[Mean]] = {}
     contrasts: list[Contrast] = []
     for measure in measures:
-        people = {label: of_people(trials, label, measure.name) for label in labels}
-        found = []
+        people = {label: _of_people(trials, label, measure.name) for label in labels}
+        found = means[measure.name] = []
         for label, values in people.items():
             each = np.array([_mean(scenes) for scenes in values.values() if scenes])
-            found.append(Mean(label=label, scripted=False, total=total, **vars(mean_of(each, rng))))
+            found.append(Mean(label=label, scripted=False, total=total, **vars(_mean_of(each, rng))))
         for label in scripted:
-            all_of = [t.values[measure.name] for t in trials if (t.condition, t.participant) == (label, "")]
-            known = np.array([value for value in all_of if is_known(value)])
-            found.append(Mean(label=label, scripted=True, total=len(all_of), **vars(mean_of(known, rng))))
-        means[measure.name] = found
+            drawn = [t.values[measure.name] for t in trials if (t.condition, t.participant) == (label, "")]
+            known = np.array([value for value in drawn if math.isfinite(value)])
+            found.append(Mean(label=label, scripted=True, total=len(drawn), **vars(_mean_of(known, rng))))
         contrasts += [
             contrast(measure, label, baseline, people[label], people[baseline], rng)
             for label in labels
             if label != baseline and baseline in people
         ]
-    return PeoplePart(
-        title, measures, means, adjusted(replace(e, scope=title, family=title) for e in contrasts)
-    )
+    tested = adjusted(replace(each, scope=title, family=title) for each in contrasts)
+    return PeoplePart(title, measures, means, tested)
 
 
-def of_people(trials: Sequence[Trial], label: str, measure: str) -> OfPeople:
+def _of_people(trials: Sequence[Trial], label: str, measure: str) -> OfPeople:
     """Return a measure's values under a condition by participant and scene, also for those with none."""
     found: dict[str, dict[int | None, list[float]]] = {}
     for trial in trials:
         if trial.participant and trial.condition == label and measure in trial.values:
             scenes = found.setdefault(trial.participant, {})
-            if is_known(trial.values[measure]):
+            if math.isfinite(trial.values[measure]):
                 scenes.setdefault(trial.scene, []).append(trial.values[measure])
     return found
 
 
-def mean_of(values: FloatArray, rng: np.random.Generator) -> Estimate:
+def _mean_of(values: FloatArray, rng: np.random.Generator) -> Estimate:
     """Return the mean over units, each of which counts alike; its interval for five or more."""
     if not len(values):
         return Estimate(counts=(0,))
@@ -224,7 +202,7 @@ def contrast(
     """
     both = [name for name in one if one[name] and other.get(name)]
     differences = np.array([_difference(one[name], other[name]) for name in both])
-    p, found = None, mean_of(differences, rng)
+    p, found = None, _mean_of(differences, rng)
     if len(both) >= FEWEST and differences.any():
         p = permutation_p((differences, np.zeros_like(differences)), difference_of_means, True, rng)
     names = {"measure": measure, "label": label, "baseline": baseline, "paired": True, "p": p}
@@ -252,32 +230,62 @@ def _cautions(
 ) -> list[str]:
     count, strangers = len(participants), {each.participant for each in study.scores} - set(participants)
     means = [mean for part in parts for means in part.means.values() for mean in means]
-    known = {
-        _TOO_FEW.format(count): count < FEWEST,
-        _BLIND.format(count): count >= FEWEST and not all(_within_reach(part.contrasts) for part in parts),
-        _SCRIPTED: any(mean.scripted for mean in means),
-        _ALONE: any(not part.contrasts and part.title != FORMS for part in parts),
-        _NO_SCORES: not study.scores,
-        _STRANGERS.format(len(strangers)): bool(strangers),
-        _LEFT_OUT.format(left_out): left_out > 0,
-    }
-    return [text for text, holds in known.items() if holds]
-
-
-def _means_table(part: PeoplePart, note: str) -> Table:
-    """Return every measure under every condition."""
-    (first, *_) = part.means.values()
-    labels = [f"{mean.label}, scripted" if mean.scripted else mean.label for mean in first]
-    rows = [
-        [measure_cell(each), *(_mean_cell(mean, each) for mean in part.means[each.name])]
-        for each in part.measures
+    reach = count < FEWEST or all(_within_reach(part.contrasts) for part in parts)
+    known = [
+        (
+            count < FEWEST,
+            f"Participants: {count}. Intervals and tests need {FEWEST} or more, so there are none.",
+        ),
+        (not reach, f"Participants: {count}. Too few to detect any difference in some tables."),
+        (any(mean.scripted for mean in means), _SCRIPTED),
+        (any(not part.contrasts and part.title != FORMS for part in parts), _ALONE),
+        (not study.scores, "No scores yet: exports/scores.csv is not there."),
+        (bool(strangers), f"Participants with scores and without an episode: {len(strangers)}."),
+        (left_out > 0, f"Episodes that name neither a participant nor a script, left out: {left_out}."),
     ]
-    return Table(("", *labels), rows, f"{note}{part.title}", _MEANS)
+    return [text for holds, text in known if holds]
 
 
-def _mean_cell(mean: Mean, measure: Measure) -> Cell:
-    below = f"n = {mean.counts[0]} of {mean.total}"
-    if mean.estimate is None:
-        return Cell("missing", "quiet", below=below)
-    span = f"{shown_interval(measure, mean.interval)}; " if mean.interval else ""
-    return Cell(shown(measure, mean.estimate), below=span + below)
+def people_report(comparison: PeopleComparison) -> Report:
+    """Return the report of a comparison of people."""
+    study, parts, baseline = comparison.study, comparison.parts, comparison.baseline
+    source, note = {"source": study.source}, f"{study.source}. " if study.demo else ""
+    tables = [table for part in parts for table in part.tables(baseline, note)]
+    content = {
+        "format": FORMAT,
+        "demo": study.demo,
+        "baseline": baseline,
+        "participants": comparison.participants,
+        "cautions": comparison.cautions,
+        "conditions": {
+            part.title: {name: [mean.content for mean in means] for name, means in part.means.items()}
+            for part in parts
+        },
+    }
+    return Report(
+        title=f"{study.root.absolute().name}: people, compared",
+        what=f"{len(comparison.participants)} participants; baseline {baseline}",
+        first=[paragraph(study.source, "headline")] if study.demo else (),
+        cautions=comparison.cautions,
+        tables=tables,
+        sections=[("", [table]) for table in tables],
+        how=_HOW,
+        measures=list(dict.fromkeys(measure for part in parts for measure in part.measures)),
+        content=source | content,
+        contrasts=[each for part in parts for each in part.contrasts],
+        units={"trials.csv": [source | _row(trial) for trial in comparison.trials]},
+        source=source,
+    )
+
+
+def _row(each: Trial) -> dict[str, Any]:
+    return {
+        "task": each.task,
+        "condition": each.condition,
+        "participant": each.participant,
+        "operator": "person" if each.participant else "scripted",
+        "scene": each.scene,
+        "dataset": each.dataset.name if each.dataset else "",
+        "episode": each.episode,
+        **each.values,
+    }

@@ -29,28 +29,20 @@ POLICY_SUCCESS = Measure("policy_success", "success of policies", SHARE, "higher
 
 @dataclass(frozen=True)
 class ConditionOutcome:
-    """One condition.
-
-    Attributes:
-        wilson: 95 % interval of the success of these very policies: Wilson's, of as many rollouts as those of
-            several policies in the same scenes are worth.
-        nested: 95 % interval over dataset draw, training seed and evaluation seed: the wider of the nested
-            bootstrap's and Student's over replicates; None for one replicate.
-        seeds: Success of each trained policy, one after the other.
-        draws: Number of draws of the dataset.
-        means: Mean of every other outcome a rollout, by name, and its 95 % interval, as `nested` is.
-        trained_on: What the first policy was trained on.
-    """
+    """The numbers of one condition."""
 
     label: str
     successes: int
     rollouts: int
     wilson: Interval
+    """95 % for these very policies, of as many rollouts as those in the same scenes are worth."""
     nested: Interval | None
-    seeds: tuple[float, ...]
-    draws: int
-    means: Mapping[str, tuple[float, Interval]]
-    trained_on: Mapping[str, float]
+    """95 % over dataset draw, training seed and evaluation seed: the wider of the nested bootstrap's and
+    Student's over replicates; None for one replicate."""
+    seeds: tuple[float, ...]  # success of each trained policy
+    draws: int  # of the dataset
+    means: Mapping[str, tuple[float, Interval]]  # of every other outcome; intervals are as `nested`
+    trained_on: Mapping[str, float]  # of the first policy
 
     @property
     def share(self) -> float:
@@ -114,26 +106,22 @@ def judge_pairs(
 
 def _condition(condition: Condition, resampled: FloatArray, rng: np.random.Generator) -> ConditionOutcome:
     runs = condition.runs()
-    values = np.concatenate([run.values for run in runs])
-    worth = independent_trials(values, [seed for run in runs for seed in run.seeds])
+    values, means = np.concatenate([run.values for run in runs]), replicates(runs)
+    worth, nested = independent_trials(values, [seed for run in runs for seed in run.seeds]), None
+    if len(means) > 1:
+        by_t = t_interval(float(means.mean()), *standard_error([runs]))
+        nested = wider(percentiles(resampled), by_t, 0.0, 1.0)
     return ConditionOutcome(
         label=condition.label,
         successes=int(values.sum()),
         rollouts=len(values),
         wilson=wilson(float(values.mean()) * worth, worth),
-        nested=_nested(runs, resampled),
+        nested=nested,
         seeds=tuple(float(run.values.mean()) for run in runs),
         draws=len({run.draw for run in runs}),
         means={name: _mean(condition.runs(name), rng) for name in condition.outcomes if name != SUCCESS},
         trained_on=condition.policies[0].trained_on,
     )
-
-
-def _nested(runs: Sequence[Run], resampled: FloatArray) -> Interval | None:
-    means = replicates(runs)
-    if len(means) < 2:
-        return None
-    return wider(percentiles(resampled), t_interval(float(means.mean()), *standard_error([runs])), 0.0, 1.0)
 
 
 def _mean(runs: Sequence[Run], rng: np.random.Generator) -> tuple[float, Interval]:

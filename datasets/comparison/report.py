@@ -1,11 +1,12 @@
-"""What every comparison shows and writes: one table of contrasts, one JSON, one CSV."""
+"""What every comparison shows and writes: a table of contrasts, and a report as page, JSON and CSV."""
 
 import json
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from handrail.datasets.presentation.markup import folded, items, page, paragraph, section
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -24,31 +25,32 @@ from handrail.datasets.statistics.resampling import Interval
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.csv_file import csv_text
 
-
-def shown(measure: Measure, value: float | None) -> str:
-    """Return a value of a measure."""
-    return percent(value) if measure.unit == SHARE else number(value)
+Rows = Sequence[Mapping[str, Any]]
 
 
-def shown_interval(measure: Measure, interval: Interval | None) -> str:
-    """Return an interval of a measure."""
-    return percent_span(interval) if measure.unit == SHARE else span(interval)
+def shown(measure: Measure, value: float | None, interval: Interval | None = None, more: str = "") -> Cell:
+    """Return a value of a measure, its interval and more below."""
+    if value is None:
+        return Cell("missing", "quiet", below=more)
+    texts = (percent, percent_span) if measure.unit == SHARE else (number, span)
+    below = (texts[1](interval), more) if interval else (more,)
+    return Cell(texts[0](value), below="; ".join(filter(None, below)))
 
 
 def measure_cell(measure: Measure, ranked: bool = True, mark: str = "") -> Cell:
-    """Return what a measure is called, its unit, and which direction is better if that counts."""
+    """Return the title of a measure, its unit, and which direction is better if that counts."""
     unit = "" if measure.unit in (SHARE, RATIO) else measure.unit
     good = f"{measure.good} is better" if measure.good and ranked else ""
     return Cell(measure.title + mark, "", measure.meaning, " · ".join(filter(None, (unit, good))))
 
 
-def difference_cell(each: Contrast) -> Cell:
+def difference_cell(each: Contrast, below: str = "") -> Cell:
     """Return the estimate, bold where a difference was detected."""
     if each.estimate is None:
         return Cell("missing" if not each.reason else DASH, "quiet", each.reason)
     texts = {SHARE: f"{points(each.estimate)} points", RATIO: f"× {number(each.estimate)}"}
-    text = texts.get(each.measure.unit, signed(each.estimate))
-    return Cell(text, "detected" if each.detected else "")
+    look = "detected" if each.detected else ""
+    return Cell(texts.get(each.measure.unit, signed(each.estimate)), look, below=below)
 
 
 def _interval(measure: Measure, interval: Interval | None) -> str:
@@ -60,7 +62,7 @@ def _detectable(each: Contrast) -> str:
     return DASH if seen is None else f"{100 * seen:.0f} points"
 
 
-Column = Callable[[Contrast], Cell | str]
+Column = Callable[[Any], Cell | str]
 COLUMNS: Mapping[str, Column] = {
     "measure": lambda each: measure_cell(each.measure),
     "group": lambda each: f"{each.label} against {each.baseline}" if each.baseline else each.label,
@@ -83,62 +85,59 @@ def contrast_table(
     caption: str = "",
     more: Mapping[str, Column] | None = None,
 ) -> Table:
-    """Return a row a contrast.
-
-    Args:
-        contrasts: Which.
-        columns: Names of `COLUMNS`.
-        title: Above the table.
-        caption: Below it.
-        more: Further columns, by heading.
-    """
+    """Return a row a contrast: some of `COLUMNS`, then more, by heading."""
     chosen = {name: COLUMNS[name] for name in columns} | dict(more or {})
     rows = [[column(each) for column in chosen.values()] for each in contrasts]
     return Table([name if name not in ("measure", "group") else "" for name in chosen], rows, title, caption)
 
 
-def write_report(
-    folder: Path,
-    html: str,
-    content: Mapping[str, Any],
-    contrasts: Iterable[Contrast],
-    units: Mapping[str, Iterable[Mapping[str, Any]]],
-    source: Mapping[str, Any] | None = None,
-    name: str = "report.json",
-) -> list[Path]:
-    """Write the report into a folder and return the files.
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """The result of a comparison, for a terminal, as a page that needs nothing else, as JSON and as CSV."""
 
-    Args:
-        folder: Made if it is not there.
-        html: The page.
-        content: Of the JSON, beside its contrasts.
-        contrasts: What was compared, for the JSON and for differences.csv.
-        units: Rows of further CSV files by name, a row for each unit.
-        source: Where the numbers come from, for each row of differences.csv.
-        name: Of the JSON.
-    """
-    found = list(contrasts)
-    tables = {**units, "differences.csv": [dict(source or {}) | each.row for each in found]}
-    texts = {"report.html": html, name: report_json(content, found)}
-    texts |= {file: csv_text(plain(list(rows))) for file, rows in tables.items() if rows}
-    with explained(f"--output {str(folder)!r}: expected a folder that can be written"):
-        for file, text in texts.items():
-            write_whole(folder / file, text.encode())
-    return [folder / file for file in texts]
+    title: str
+    headline: str = ""
+    cautions: Sequence[str] = ()
+    tables: Sequence[Table] = ()  # of the terminal
+    what: str = ""  # is compared
+    first: Sequence[str] = ()  # below the headline
+    sections: Sequence[tuple[str, Sequence[str | Table]]]
+    how: str  # to read it
+    measures: Sequence[Measure] = ()
+    content: Mapping[str, Any]  # of the JSON, beside the contrasts
+    contrasts: Sequence[Contrast]
+    units: Mapping[str, Rows] = field(default_factory=dict)  # of CSV files, a row for each unit
+    source: Mapping[str, Any] = field(default_factory=dict)  # of the numbers, in each row of differences.csv
+
+    @property
+    def html(self) -> str:
+        """The page: the answer first, then how it came about."""
+        cautions = items(("caution", text) for text in self.cautions)
+        meanings = items(("quiet", f"{each.title}: {each.meaning}.") for each in self.measures)
+        parts = [paragraph(self.headline, "headline") if self.headline else "", *self.first]
+        parts += [section("Read this first", cautions) if self.cautions else ""]
+        parts += [section(title, *shown) for title, shown in self.sections if any(shown)]
+        told = [paragraph(self.how), folded("What every measure means", meanings) if self.measures else ""]
+        return page(self.title, *parts, section("How to read this", *told), what=self.what)
+
+    @property
+    def json(self) -> str:
+        """Content and contrasts."""
+        whole = {**self.content, "contrasts": [each.content for each in self.contrasts]}
+        return json.dumps(_plain(whole), indent=1, allow_nan=False) + "\n"
+
+    def write(self, folder: Path, name: str = "report.json") -> list[Path]:
+        """Write page, JSON and CSV files into a folder, made if it is not there; return the files."""
+        tables = {**self.units, "differences.csv": [{**self.source, **each.row} for each in self.contrasts]}
+        texts = {"report.html": self.html, name: self.json}
+        texts |= {file: csv_text(_plain(rows)) for file, rows in tables.items() if rows}
+        with explained(f"--output {str(folder)!r}: expected a folder that can be written"):
+            for file, text in texts.items():
+                write_whole(folder / file, text.encode())
+        return [folder / file for file in texts]
 
 
-def report_json(content: Mapping[str, Any], contrasts: Iterable[Contrast]) -> str:
-    """Return content and contrasts as JSON; what is no finite number is null."""
-    whole = dict(content) | {"contrasts": [each.content for each in contrasts]}
-    return json.dumps(plain(whole), indent=1, allow_nan=False) + "\n"
-
-
-def plain(value: Any) -> Any:
+def _plain(value: Any) -> Any:
     """Return a value as JSON has it; what is no finite number is None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    text = json.dumps(value, default=lambda each: each.item())
+    return json.loads(text, parse_constant=lambda _: None)

@@ -1,6 +1,5 @@
 """The folder of a user study: its datasets by task and condition, its forms, and every trial measured."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,15 +21,8 @@ from handrail.datasets.storage.strict_json import load_json
 
 SCRIPTED = "scripted"  # the name of the operator, as handrail-record writes it
 _CHOSEN = (
-    "contacts",
-    "smallest_distance",
-    "mode_switches",
-    "input_reversals",
-    "idle_raw",
-    "input_idle",
-    "undos",
-    "input_age",
-    "round_trip",
+    *("contacts", "smallest_distance", "mode_switches", "input_reversals", "idle_raw", "input_idle"),
+    *("undos", "input_age", "round_trip"),
 )
 
 
@@ -55,22 +47,16 @@ MEASURES = (success, completion_time, *(each for each in METRICS if each.name in
 
 @dataclass(frozen=True)
 class StudyData:
-    """What lies in the folder.
-
-    Attributes:
-        demo: Whether the participants are synthetic.
-        datasets: Folders, by task and condition (a teleop mode).
-        scores: What the forms gave; none before the first was filled in.
-    """
+    """The content of a study's folder."""
 
     root: Path
-    demo: bool
-    datasets: dict[tuple[str, str], Path]
-    scores: tuple[Score, ...]
+    demo: bool  # whether the participants are synthetic
+    datasets: Mapping[tuple[str, str], Path]  # by task and condition (a teleop mode)
+    scores: tuple[Score, ...]  # of the forms
 
     @property
     def source(self) -> str:
-        """Where the numbers come from: `PEOPLE` or `DEMO`."""
+        """The source of the numbers: `PEOPLE` or `DEMO`."""
         return DEMO if self.demo else PEOPLE
 
     @property
@@ -81,27 +67,19 @@ class StudyData:
 
 @dataclass(frozen=True)
 class Trial:
-    """One episode, or one score of a form.
-
-    Attributes:
-        participant: Operator of the episode; "" for a scripted operator.
-        scene: Its seed; None where it is not recorded.
-        dataset: Folder of its dataset; None for a form.
-        episode: Its number there.
-        values: By measure; NaN where one does not apply.
-    """
+    """One episode, or one score of a form."""
 
     task: str
     condition: str
-    participant: str
-    values: Mapping[str, float]
-    scene: int | None = None
-    dataset: Path | None = None
+    participant: str  # "" for a scripted operator
+    values: Mapping[str, float]  # by measure; NaN where one does not apply
+    scene: int | None = None  # seed of the episode
+    dataset: Path | None = None  # None for a form
     episode: int = 0
 
 
 def read_study(root: Path) -> StudyData:
-    """Read what a study's folder holds."""
+    """Read a study's folder."""
     described = load_json(root / "study.json", "the study.json of a user study")
     demo = described.get("demo", False) if isinstance(described, dict) else None
     if not isinstance(demo, bool):
@@ -112,23 +90,16 @@ def read_study(root: Path) -> StudyData:
         raise HandrailError(f"study {str(root)!r}: expected datasets in data/TASK/MODE, found none yet")
     path = root / "exports" / "scores.csv"
     scores, conditions = read_scores(path), sorted({condition for _, condition in datasets})
-    for score in scores:
-        if score.condition not in conditions:
-            expected = ", ".join(conditions)
-            raise HandrailError(
-                f"{str(path)!r}: unknown condition {score.condition!r}: expected one of {expected}"
-            )
-    demo |= any(score.source == DEMO for score in scores)
-    return StudyData(root, demo, datasets, scores)
+    for name in (score.condition for score in scores if score.condition not in conditions):
+        expected = ", ".join(conditions)
+        raise HandrailError(f"{str(path)!r}: unknown condition {name!r}: expected one of {expected}")
+    return StudyData(root, demo or any(score.source == DEMO for score in scores), datasets, scores)
 
 
 def form_trials(study: StudyData, title: str) -> list[Trial]:
     """Return every score of the forms."""
-    return [
-        Trial(title, each.condition, each.participant, {each.score: each.value})
-        for each in study.scores
-        if each.value is not None
-    ]
+    known = [each for each in study.scores if each.value is not None]
+    return [Trial(title, e.condition, e.participant, {e.score: float(e.value or 0.0)}) for e in known]
 
 
 def read_trials(study: StudyData, scripted: Sequence[Path], columns: ColumnNames) -> tuple[list[Trial], int]:
@@ -150,10 +121,9 @@ def read_trials(study: StudyData, scripted: Sequence[Path], columns: ColumnNames
                 found.setdefault(task, []).append((condition, episode))
             else:
                 left_out += 1
-    for root in scripted:
-        for episode in recorded_episodes(root, columns):
-            task, condition = _scripted(root, episode)
-            found.setdefault(task, []).append((condition, episode))
+    for episode in (episode for root in scripted for episode in recorded_episodes(root, columns)):
+        task, condition = _task_and_mode(episode)
+        found.setdefault(task, []).append((condition, episode))
     return [trial for task, episodes in found.items() for trial in _measured(task, episodes)], left_out
 
 
@@ -161,9 +131,9 @@ def _participant(episode: Episode) -> str:
     return str(episode.meta.get("participant") or "")
 
 
-def _scripted(root: Path, episode: Episode) -> tuple[str, str]:
+def _task_and_mode(episode: Episode) -> tuple[str, str]:
     """Return task and mode of an episode of a dataset that is no part of the study."""
-    where = f"dataset {str(root)!r}, episode {episode.number}"
+    where = f"dataset {str(episode.info.root)!r}, episode {episode.number}"
     if _participant(episode):
         raise HandrailError(
             f"{where}: expected a scripted operator, got participant {_participant(episode)!r};"
@@ -177,13 +147,13 @@ def _scripted(root: Path, episode: Episode) -> tuple[str, str]:
 
 def _measured(task: str, episodes: Sequence[tuple[str, Episode]]) -> Iterator[Trial]:
     """Yield the trials of a task, all on one scale where their columns are the same."""
-    groups: dict[tuple[str, Path], list[Episode]] = {}
+    groups: dict[str, list[tuple[str, Episode]]] = {}
     for condition, episode in episodes:
-        groups.setdefault((condition, episode.info.root), []).append(episode)
-    labels = {f"{condition} of {root}": members for (condition, root), members in groups.items()}
-    values = measure(labels, np.random.default_rng(0), metrics=MEASURES).values
-    for (condition, root), (label, members) in zip(groups, labels.items(), strict=True):
-        for place, episode in enumerate(members):
+        groups.setdefault(f"{condition} of {episode.info.root}", []).append((condition, episode))
+    sets = {label: [episode for _, episode in members] for label, members in groups.items()}
+    values = measure(sets, np.random.default_rng(0), metrics=MEASURES).values
+    for label, members in groups.items():
+        for place, (condition, episode) in enumerate(members):
             seed = episode.meta.get("seed")
             yield Trial(
                 task=task,
@@ -191,11 +161,6 @@ def _measured(task: str, episodes: Sequence[tuple[str, Episode]]) -> Iterator[Tr
                 participant=_participant(episode),
                 values={each.name: float(values[each.name][label].values[place]) for each in MEASURES},
                 scene=seed if isinstance(seed, int) else None,
-                dataset=root,
+                dataset=episode.info.root,
                 episode=episode.number,
             )
-
-
-def is_known(value: float) -> bool:
-    """Return whether a number is one."""
-    return math.isfinite(value)

@@ -1,11 +1,13 @@
-"""The pieces of HTML that reports are made of, as `pieces.jinja` has them; whatever goes in is escaped."""
+"""The pieces of HTML that reports are made of: the macros of `pieces.jinja`; whatever goes in is escaped.
 
-from collections.abc import Iterable
+A part of a page or a section is a piece that was made here, or a `Table`.
+"""
+
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from handrail.datasets.presentation.table import Table
 from handrail.datasets.printable import printable
 
 
@@ -23,70 +25,21 @@ def _pieces() -> Any:
     return environment.get_template("pieces.jinja").module
 
 
-def _piece(name: str, *given: Any) -> str:
-    return str(getattr(_pieces(), name)(*given))
+def _piece(name: str) -> Callable[..., str]:
+    return lambda *given, **named: str(getattr(_pieces(), name)(*given, **named))
 
 
-def page(title: str, *parts: str | Table, what: str = "") -> str:
-    """Return a whole page that needs nothing else: its title, what it is about, and its parts."""
-    return _piece("page", title, parts, what)
-
-
-def section(title: str, *parts: str | Table) -> str:
-    """Return a section, with a heading if it has a title."""
-    return _piece("section", title, parts)
-
-
-def table(shown: Table) -> str:
-    """Return a table, its title above and its caption below."""
-    return _piece("table", shown)
-
-
-def film(address: str) -> str:
-    """Return a video."""
-    return _piece("film", address)
-
-
-def items(texts: Iterable[tuple[str, str]]) -> str:
-    """Return a list of texts, each with a class of the style."""
-    return _piece("items", texts)
-
-
-def paragraph(text: str, look: str = "") -> str:
-    """Return a paragraph."""
-    return _piece("paragraph", text, look)
-
-
-def panels(shown: Iterable[tuple[str, str, str]], look: str = "") -> str:
-    """Return figures side by side as the page has room, each below its title.
-
-    Args:
-        shown: Title, note and address of each.
-        look: `small` or `wide`; "" for half the page.
-    """
-    return _piece("panels", figures, look) if (figures := list(shown)) else ""
-
-
-def legend(colours: Iterable[tuple[str, str]]) -> str:
-    """Return which colour is whose."""
-    return _piece("legend", colours)
-
-
-def gallery(pictures: Iterable[tuple[str, str]]) -> str:
-    """Return small pictures with captions."""
-    return _piece("gallery", shown) if (shown := list(pictures)) else ""
-
-
-def card(title: str, colour: str, big: str, lines: Iterable[str]) -> str:
-    """Return a card with one large number."""
-    return _piece("card", title, colour, big, lines)
-
-
-def cards(shown: Iterable[str]) -> str:
-    """Return cards side by side."""
-    return _piece("cards", shown)
-
-
-def folded(summary: str, content: str) -> str:
-    """Return what opens when asked for."""
-    return _piece("folded", summary, content)
+page = _piece("page")  # (title, *parts, what=""): a whole page that needs nothing else
+section = _piece("section")  # (title, *parts): with a heading if it has a title
+table = _piece("table")  # (Table): its title above and its caption below
+film = _piece("film")  # (address of a video)
+items = _piece("items")  # (pairs of a class of the style and a text): a list
+paragraph = _piece("paragraph")  # (text, look="")
+panels = _piece(
+    "panels"
+)  # (title, note and address of each figure, look=""): `small` or `wide`, or half the page
+legend = _piece("legend")  # (pairs of a label and its colour)
+gallery = _piece("gallery")  # (pairs of a caption and an address): small pictures
+card = _piece("card")  # (title, colour, text in large, lines)
+cards = _piece("cards")  # (cards): side by side
+folded = _piece("folded")  # (summary, piece): what opens when asked for

@@ -13,6 +13,7 @@ from handrail.datasets.quality.metric import metric
 from handrail.datasets.reading.demonstration import DoesNotApply
 
 RESOLUTION = 1e-3  # of the scale: states that are nearer are one state
+_COMPONENTS = 8  # principal components at most, of what a policy reads and does
 _NEIGHBOURS = 5
 _KS = (5, 6, 7)
 _BATCH = 1024
@@ -21,23 +22,21 @@ _BATCH = 1024
 @metric("σ²", "", "scale", of_dataset=True)
 def action_variance(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
     """Spread of actions in like states of other episodes; falls with their number, no rank of quality."""
-    states = dataset.points(lambda each: dataset.scale.observations(each.observation))
-    actions = dataset.points(lambda each: dataset.scale.actions(each.relative_action))
+    states, actions = dataset.points("observation", _COMPONENTS), dataset.points("relative_action")
     return neighbour_variance(states, actions, dataset.owner)
 
 
 @metric("nat", "", "scale", of_dataset=True)
 def state_coverage(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
     """Entropy of the configurations: too little and too much are both bad; for groups of the same size."""
-    return entropy(dataset.points(lambda each: dataset.scale.configurations(each.configuration)))
+    return entropy(dataset.points("configuration"))
 
 
 @metric("nat", "higher", "scale", "mutual information", of_dataset=True)
 def information(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
     """What the state says about the action (DemInf): varied and predictable at once."""
-    states = dataset.points(lambda each: dataset.scale.observations(each.observation))
-    actions = dataset.points(lambda each: dataset.scale.action_components(each.relative_action))
-    return mutual_information(states, actions, rng)
+    states = dataset.points("observation", _COMPONENTS)
+    return mutual_information(states, dataset.points("relative_action", _COMPONENTS), rng)
 
 
 def neighbour_variance(states: FloatArray, actions: FloatArray, owner: IntArray) -> FloatArray:

@@ -1,12 +1,12 @@
 """The episodes of one group that is compared, and what reading them one after the other gave."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.quality.scale import Scale
+from handrail.datasets.quality.scale import Scale, embed
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.episode import Episode
 from handrail.datasets.reading.load import each_opened
@@ -47,9 +47,10 @@ class EpisodeSet:
         places = np.unique(np.linspace(0, count - 1, min(_SOME, count)).round().astype(int))
         return each_opened(self.episodes[place] for place in places.tolist())
 
-    def points(self, read: Callable[[Demonstration], FloatArray]) -> FloatArray:
-        """Return what is read of all excerpts, `(N, d)`."""
-        return np.vstack([read(each) for each in self.excerpts.values()])
+    def points(self, part: str, most: int | None = None) -> FloatArray:
+        """Return a part of all excerpts, `(N, m)`, mapped as `embed` says."""
+        mapped = embed(self.scale.part(part), most)
+        return np.vstack([mapped(getattr(each, part)) for each in self.excerpts.values()])
 
     @property
     def owner(self) -> IntArray:

@@ -14,7 +14,6 @@ from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 _FEW = 2  # values that an entry takes if it is a switch
 _STILL = 1e-9  # a standard deviation below this is that of a constant
-_COMPONENTS = 8  # principal components at most
 
 Embedding = Callable[[FloatArray], FloatArray]
 
@@ -101,34 +100,15 @@ class Scale:
     @cached_property
     def action_range(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest value of each entry of the action, `(a,)` each; the same for a switch."""
-        return self._part("action").range
+        return self.part("action").range
 
     @cached_property
     def input_scale(self) -> FloatArray:
         """Largest input of each axis, `(u,)`."""
-        return np.array([np.abs(each).max() for each in self._part("inputs").values])
+        return np.array([np.abs(each).max() for each in self.part("inputs").values])
 
-    @cached_property
-    def configurations(self) -> Embedding:
-        """Standardised configurations."""
-        return embed(self._part("configuration"))
-
-    @cached_property
-    def observations(self) -> Embedding:
-        """Principal components of what a policy reads."""
-        return embed(self._part("observation"), _COMPONENTS)
-
-    @cached_property
-    def actions(self) -> Embedding:
-        """Standardised relative actions."""
-        return embed(self._part("relative_action"))
-
-    @cached_property
-    def action_components(self) -> Embedding:
-        """Principal components of the relative actions."""
-        return embed(self._part("relative_action"), _COMPONENTS)
-
-    def _part(self, name: str) -> Any:
+    def part(self, name: str) -> Any:
+        """Return the `Spread` or the `Extent` of a part."""
         part = self._parts[name]
         if isinstance(part, DoesNotApply):
             raise part

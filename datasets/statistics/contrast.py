@@ -32,50 +32,31 @@ _HIDDEN = ("measure", "scope", "label", "baseline", "family", "reason", "incompa
 
 @dataclass(frozen=True)
 class Measure:
-    """What is compared.
+    """A quantity that is compared."""
 
-    Attributes:
-        name: Its name in JSON and CSV.
-        title: What people call it.
-        unit: Of its values; "" for a pure number.
-        good: "higher" or "lower" where everything else being equal that is better; "" where it is not so.
-        meaning: One sentence.
-    """
-
-    name: str
-    title: str
-    unit: str = ""
-    good: str = ""
-    meaning: str = ""
+    name: str  # in JSON and CSV
+    title: str  # for people
+    unit: str = ""  # "" for a pure number
+    good: str = ""  # "higher" or "lower" where everything else being equal that is better
+    meaning: str = ""  # one sentence
 
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """A number, or a difference, and how sure it is; None for what nothing is known of.
-
-    Attributes:
-        interval: 95 %.
-        p: Two-sided, of there being no difference.
-        counts: Units that count, of the condition and of the baseline; one number where they are pairs.
-        errors: Standard error and degrees of freedom of every test that has to agree.
-        paired: Whether the same units were measured under both.
-        largest: The largest difference that there may be.
-    """
+    """A number, or a difference, and how sure it is; None for what nothing is known of."""
 
     estimate: float | None = None
-    interval: Interval | None = None
-    p: float | None = None
-    counts: tuple[int, ...] = ()
-    errors: tuple[tuple[float, float], ...] = ()
-    paired: bool = False
-    largest: float = float("inf")
+    interval: Interval | None = None  # 95 %
+    p: float | None = None  # two-sided, of there being no difference
+    counts: tuple[
+        int, ...
+    ] = ()  # units of the condition and of the baseline; one number where they are pairs
+    errors: tuple[tuple[float, float], ...] = ()  # standard error and degrees of freedom of each test
+    paired: bool = False  # whether the same units were measured under both
+    largest: float = float("inf")  # difference that there may be
 
     def detectable(self, tests: int = 1) -> float | None:
-        """Return the difference that would be seen as one in 80 % of such experiments; None if unknown.
-
-        Args:
-            tests: Number of tests that the p is adjusted for.
-        """
+        """Return the difference that 80 % of such experiments detect after Holm over so many tests."""
         if not self.errors:
             return None
         return min(self.largest, max(reach(tests, freedom) * error for error, freedom in self.errors))
@@ -83,30 +64,21 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True)
 class Contrast(Estimate):
-    """A measure under a condition minus the same under the baseline.
-
-    Attributes:
-        scope: Of which episodes, task or tasks.
-        family: Of tests that the p is adjusted for, declared before anything is known of the results.
-        nested: 95 % with the training of policies drawn anew, too; None where that is not known.
-        p_adjusted: By Holm over the family; None where nothing is tested.
-        tests: Their number in the family.
-        null: What no difference is: 1 for a ratio.
-        reason: Why there is no difference to speak of; "" if there is one.
-        sides: Means of what is added and of what is taken off, where that is more than two conditions.
-    """
+    """A measure under a condition minus the same under the baseline."""
 
     measure: Measure
     label: str
     baseline: str = ""
-    scope: str = ""
-    family: str = ""
-    nested: Interval | None = None
-    p_adjusted: float | None = None
-    tests: int = 1
-    null: float = 0.0
-    reason: str = ""
-    sides: tuple[float, float] | None = None
+    scope: str = ""  # which episodes, task or tasks
+    family: str = ""  # of tests that p is adjusted for, declared before anything is known of the results
+    nested: Interval | None = None  # 95 % with the training of policies drawn anew, too, where that is known
+    p_adjusted: float | None = None  # by Holm over the family; None where nothing is tested
+    tests: int = 1  # in the family
+    null: float = 0.0  # no difference: 1 for a ratio
+    reason: str = ""  # why there is no difference to speak of
+    sides: tuple[float, float] | None = (
+        None  # means of what is added and taken off, of more than two conditions
+    )
 
     @property
     def detected(self) -> bool:

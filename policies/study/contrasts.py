@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.replicates import student
-from handrail.policies.study.design import CONTRASTS, StudyDesign
+from handrail.policies.study.design import CONTRASTS, Factors, StudyDesign
 from handrail.policies.study.power import weights
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
@@ -17,6 +18,7 @@ WORDS = {
     "controller": "controller: MPC − none",
     "interaction": "interaction: what the MPC adds with the hand − with the joints",
 }
+Parts = Mapping[str, float]  # the weight of each policy's success
 
 
 def contrasts(results: Results) -> list[Contrast]:
@@ -24,62 +26,46 @@ def contrasts(results: Results) -> list[Contrast]:
 
     Nothing is tested before all draws are there: who looks in between and stops where it suits finds more.
     """
-    design = results.progress.design
-    names = design.factors.primary if design.factors else ()
-    declared = [_factor(results, design, name, tuple(design.tasks), DECLARED) for name in names]
-    whole = [each for each in declared if each and each.counts == (design.draws,) != (1,)]
-    tested = {each.label: each for each in adjusted(whole)}
-    found = [replace(tested.get(each.label, each), tests=len(names)) for each in declared if each]
-    return found + [each for each in _exploratory(results, design) if each]
-
-
-def _exploratory(results: Results, design: StudyDesign) -> Iterator[Contrast | None]:
-    tasks = tuple(design.tasks)
-    scopes = [*([tasks] if len(tasks) > 1 else []), *((task,) for task in tasks)]
+    design, tasks = results.progress.design, tuple(results.progress.design.tasks)
     factors = design.factors
-    for scope in scopes:
-        for name in CONTRASTS if factors else ():
-            if scope != tasks or name not in factors.primary:  # pyright: ignore[reportOptionalMemberAccess]
-                yield _factor(results, design, name, scope, EXPLORATORY)
-        if factors:
-            for one, other in factors.pairs:
-                yield _pair(results, one, other, scope)
-                yield _pair(results, one, other, scope, "", "clean")
-                yield _pair(results, one, other, scope, " same number")
-        for mode in () if factors else design.modes:
-            if mode != design.baseline:
-                yield _pair(results, mode, design.baseline, scope)
-        yield from _systems(results, design, scope)
-        for name in CONTRASTS if factors else ():
-            yield _factor(results, design, name, scope, EXPLORATORY, " same number")
-            yield _factor(results, design, name, scope, EXPLORATORY, "", "contact")
-            yield _factor(results, design, name, scope, EXPLORATORY, "", "clean")
+    asked = [_factor(factors, name) for name in factors.primary] if factors else []
+    declared = [each for one in asked if (each := _contrast(results, DECLARED, tasks, *one))]
+    whole = [each for each in declared if each.counts == (design.draws,) != (1,)]
+    tested = {each.label: each for each in adjusted(whole)}
+    found = [replace(tested.get(each.label, each), tests=len(asked)) for each in declared]
+    scopes = [*([tasks] if len(tasks) > 1 else []), *((task,) for task in tasks)]
+    explored = [each for scope in scopes for each in _exploratory(results, design, scope) if each]
+    return found + explored
 
 
-def _factor(
-    results: Results,
-    design: StudyDesign,
-    name: str,
-    tasks: tuple[str, ...],
-    kind: str,
-    ending: str = "",
-    measure: str = "success",
-) -> Contrast | None:
-    assert design.factors is not None
-    parts = {f"{mode}{ending}": weight for mode, weight in weights(design.factors, name).items()}
-    return _contrast(results, f"{WORDS[name]}{_bracketed(ending)}", kind, tasks, parts, measure)
+def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
+    ask, factors = partial(_contrast, results, EXPLORATORY, tasks), design.factors
+    if not factors:
+        rivals = [mode for mode in design.modes if mode != design.baseline]
+        yield from (ask(*_pair(mode, design.baseline)) for mode in rivals)
+        yield from _systems(results, design, tasks)
+        return
+    for name in CONTRASTS:
+        if tasks != tuple(design.tasks) or name not in factors.primary:
+            yield ask(*_factor(factors, name))
+    for pair in factors.pairs:
+        yield ask(*_pair(*pair))
+        yield ask(*_pair(*pair), "clean")
+        yield ask(*_pair(*pair, " same number"))
+    yield from _systems(results, design, tasks)
+    for name in CONTRASTS:
+        yield ask(*_factor(factors, name, " same number"))
+        yield ask(*_factor(factors, name), "contact")
+        yield ask(*_factor(factors, name), "clean")
 
 
-def _pair(
-    results: Results,
-    one: str,
-    other: str,
-    tasks: tuple[str, ...],
-    ending: str = "",
-    measure: str = "success",
-) -> Contrast | None:
-    parts = {f"{one}{ending}": 1.0, f"{other}{ending}": -1.0}
-    return _contrast(results, f"{one} − {other}{_bracketed(ending)}", EXPLORATORY, tasks, parts, measure)
+def _factor(factors: Factors, name: str, ending: str = "") -> tuple[str, Parts]:
+    parts = {f"{mode}{ending}": weight for mode, weight in weights(factors, name).items()}
+    return f"{WORDS[name]}{_bracketed(ending)}", parts
+
+
+def _pair(one: str, other: str, ending: str = "") -> tuple[str, Parts]:
+    return f"{one} − {other}{_bracketed(ending)}", {f"{one}{ending}": 1.0, f"{other}{ending}": -1.0}
 
 
 def _bracketed(ending: str) -> str:
@@ -89,44 +75,36 @@ def _bracketed(ending: str) -> str:
 def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
     """Yield intents completed by the MPC against what did best of joint velocities in the same measure."""
     for mode in design.beside.intents if design.beside else ():
-        intent = [results.find(task, f"{mode} intent") for task in tasks]
-        if not all(intent):
+        intents = [each for task in tasks if (each := results.find(task, f"{mode} intent"))]
+        if len(intents) < len(tasks):
             continue
-        draws = set.intersection(*(set(each.draws) for each in intent if each))
+        draws = set.intersection(*(set(each.draws) for each in intents))
         for measure, sign in (("success", 1.0), ("contact", -1.0)):
-            rivals = [[results.find(task, label) for task in tasks] for label in design.modes]
-            means = {
-                label: sign * mean
-                for label, each in zip(design.modes, rivals, strict=True)
-                if (mean := _mean(each, draws, measure)) is not None
-            }
-            if means:
-                best = max(means, key=means.__getitem__)
-                parts = {f"{mode} intent": 1.0, best: -1.0}
+            found = {label: _mean(results, tasks, label, draws, measure) for label in design.modes}
+            known = {label: sign * mean for label, mean in found.items() if mean is not None}
+            if known:
+                best = max(known, key=known.__getitem__)
                 title = (
                     f"{mode} intent + MPC − {best}, of the unprotected policies of joint velocities the best"
                 )
-                yield _contrast(results, title, SYSTEM, tasks, parts, measure)
+                parts = {f"{mode} intent": 1.0, best: -1.0}
+                yield _contrast(results, SYSTEM, tasks, title, parts, measure)
 
 
-def _mean(conditions: Sequence[StudyCondition | None], draws: set[int], measure: str) -> float | None:
-    """Return the mean of a measure over conditions and some draws; None where one is missing."""
-    known = [each for each in conditions if each and draws <= each.draws.keys()]
-    if len(known) < len(conditions):
+def _mean(results: Results, tasks: Sequence[str], label: str, draws: set[int], measure: str) -> float | None:
+    """Return the mean of a measure of a policy over tasks and some draws; None where one is missing."""
+    found = [results.find(task, label) for task in tasks]
+    known = [each for each in found if each and draws <= each.draws.keys()]
+    if len(known) < len(found):
         return None
     return float(np.mean([each.share(draw, measure) for each in known for draw in draws]))
 
 
 def _contrast(
-    results: Results,
-    name: str,
-    kind: str,
-    tasks: tuple[str, ...],
-    parts: Mapping[str, float],
-    measure: str = "success",
+    results: Results, kind: str, tasks: Sequence[str], label: str, parts: Parts, measure: str = "success"
 ) -> Contrast | None:
     """Return a contrast over the draws that all of its conditions have; None without any."""
-    found = [(results.find(task, label), weight) for task in tasks for label, weight in parts.items()]
+    found = [(results.find(task, name), weight) for task in tasks for name, weight in parts.items()]
     conditions = [(each, weight / len(tasks)) for each, weight in found if each]
     if len(conditions) < len(found):
         return None
@@ -138,7 +116,7 @@ def _contrast(
     sides = _side(conditions, draws, measure, 1.0), _side(conditions, draws, measure, -1.0)
     return Contrast(
         measure=MEASURES[measure],
-        label=name,
+        label=label,
         scope=", ".join(tasks),
         family=kind,
         sides=sides,

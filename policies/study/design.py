@@ -103,13 +103,8 @@ class Factors:
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """Cells that are compared by themselves: that differ in one thing, and the two of a user's choice."""
-        return (
-            (self.hand_mpc, self.hand_none),
-            (self.joint_mpc, self.joint_none),
-            (self.hand_mpc, self.joint_mpc),
-            (self.hand_none, self.joint_none),
-            (self.hand_mpc, self.joint_none),
-        )
+        hand, joint = (self.hand_mpc, self.hand_none), (self.joint_mpc, self.joint_none)
+        return hand, joint, *zip(hand, joint, strict=True), (self.hand_mpc, self.joint_none)
 
 
 @dataclass(frozen=True)
@@ -178,29 +173,27 @@ class StudyDesign:
         check_known("mode", self.modes, MODES)
         check_known("task", self.tasks, TASKS)
         check_known("baseline", (self.baseline,), self.modes)
-        self._check_once("modes", self.modes)
-        if self.factors:
-            check_known("mode of the factors", self.factors.modes, self.modes)
-            check_known("contrast", self.factors.primary, CONTRASTS)
-            self._check_once("factors", self.factors.modes)
-            self._check_once("factors.primary", self.factors.primary or CONTRASTS)
-        if self.beside:
+        once: dict[str, tuple[str, ...]] = {"modes": self.modes}
+        draws: dict[str, int] = {}
+        if factors := self.factors:
+            check_known("mode of the factors", factors.modes, self.modes)
+            check_known("contrast", factors.primary, CONTRASTS)
+            once |= {"factors": factors.modes, "factors.primary": factors.primary or CONTRASTS}
+        if beside := self.beside:
             completed = [mode for mode in self.modes if MODES[mode].controller == "mpc"]
-            check_known("mode of intents, which the MPC completes", self.beside.intents, completed)
-            self._check_draws("beside.draws", self.beside.draws)
-            self._check_draws("beside.same_number", self.beside.same_number)
-        if self.robustness:
-            chosen = (*self.robustness.perturbations, *self.robustness.protections)
-            self._check_once("robustness", chosen)
-            self._check_draws("robustness.draws", self.robustness.draws)
-
-    def _check_once(self, name: str, chosen: tuple[str, ...]) -> None:
-        if not chosen or len(set(chosen)) < len(chosen):
-            raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
-
-    def _check_draws(self, name: str, count: int) -> None:
-        if count > self.draws:
-            raise HandrailError(f"study {self.name}: {name} expected at most {self.draws} draws, got {count}")
+            check_known("mode of intents, which the MPC completes", beside.intents, completed)
+            draws |= {"beside.draws": beside.draws, "beside.same_number": beside.same_number}
+        if robust := self.robustness:
+            once["robustness"] = (*robust.perturbations, *robust.protections)
+            draws["robustness.draws"] = robust.draws
+        for name, chosen in once.items():
+            if not chosen or len(set(chosen)) < len(chosen):
+                raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
+        for name, count in draws.items():
+            if count > self.draws:
+                raise HandrailError(
+                    f"study {self.name}: {name} expected at most {self.draws} draws, got {count}"
+                )
 
 
 def check_known(what: str, names: Iterable[str], choices: Iterable[str]) -> None:

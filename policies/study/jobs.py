@@ -7,8 +7,6 @@ from typing import Literal
 
 from handrail.policies.study.design import StudyDesign
 
-Actions = Literal["realised", "intent"]
-Budget = Literal["time", "number"]
 CONDITIONS = ("nominal", "disturbed", "protected")
 
 
@@ -28,23 +26,17 @@ class StudyCell:
 
 @dataclass(frozen=True)
 class StudyPolicy:
-    """What one policy is trained on and what it writes.
-
-    Attributes:
-        cell: whose dataset.
-        actions: `realised` joint velocities, or the operator's `intent`.
-        budget: how much of the dataset: the same operator's `time`, or the same `number` of demonstrations.
-    """
+    """A policy of a cell's dataset."""
 
     cell: StudyCell
-    actions: Actions = "realised"
-    budget: Budget = "time"
+    actions: Literal["realised", "intent"] = "realised"  # joint velocities, or the operator's intent
+    budget: Literal["time", "number"] = "time"  # the same operator's time, or number of demonstrations
 
     @property
     def label(self) -> str:
-        """What an evaluation calls it: the mode, and what is special about it."""
-        words = [self.cell.mode, self.actions if self.actions != "realised" else ""]
-        return " ".join(filter(None, [*words, "same number" if self.budget == "number" else ""]))
+        """Its name in an evaluation: the mode, and its special features."""
+        intent = " intent" if self.actions == "intent" else ""
+        return self.cell.mode + intent + (" same number" if self.budget == "number" else "")
 
     @property
     def name(self) -> str:
@@ -54,19 +46,12 @@ class StudyPolicy:
 
 @dataclass(frozen=True)
 class StudyJob:
-    """One piece of work: collect a dataset, or train and evaluate a policy.
+    """One piece of work: collect a cell's dataset, or train and evaluate a policy."""
 
-    Attributes:
-        name: of the job, unique.
-        cell: whose dataset it collects or learns from.
-        policy: to train and evaluate; None collects.
-        robust: whether the policy also goes through the further conditions.
-    """
-
-    name: str
+    name: str  # unique
     cell: StudyCell
-    policy: StudyPolicy | None = None
-    robust: bool = False
+    policy: StudyPolicy | None = None  # None collects
+    robust: bool = False  # whether the policy also goes through the further conditions
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -81,20 +66,18 @@ def jobs(design: StudyDesign) -> list[StudyJob]:
 
 def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
     """Yield the jobs of a draw: after each draw what is done is balanced."""
-    robust = design.robustness is not None and draw < design.robustness.draws
-    cells = {task: [StudyCell(task, mode, draw) for mode in design.modes] for task in design.tasks}
-    for task in design.tasks:
-        yield from map(_collect, cells[task])
-        yield from (_policy(StudyPolicy(cell), robust) for cell in cells[task])
-    for cell in (cell for task in design.tasks for cell in cells[task]):
-        if design.beside and draw < design.beside.draws and cell.mode in design.beside.intents:
+    robust, beside = design.robustness is not None and draw < design.robustness.draws, design.beside
+    cells = [[StudyCell(task, mode, draw) for mode in design.modes] for task in design.tasks]
+    for each in cells:
+        yield from (StudyJob(f"collect/{cell.name}", cell) for cell in each)
+        yield from (_policy(StudyPolicy(cell), robust) for cell in each)
+    if beside is None:
+        return
+    for cell in (cell for each in cells for cell in each):
+        if draw < beside.draws and cell.mode in beside.intents:
             yield _policy(StudyPolicy(cell, "intent"), robust)
-        if design.beside and draw < design.beside.same_number:
+        if draw < beside.same_number:
             yield _policy(StudyPolicy(cell, budget="number"), robust=False)
-
-
-def _collect(cell: StudyCell) -> StudyJob:
-    return StudyJob(f"collect/{cell.name}", cell)
 
 
 def _policy(policy: StudyPolicy, robust: bool) -> StudyJob:

@@ -6,6 +6,7 @@ from handrail.datasets.statistics.contrast import reach
 from handrail.policies.study.design import CONTRASTS, Factors, StudyDesign
 
 _WORST = 0.25  # variance of a rollout's success: of one that succeeds in half of all cases
+_SIGNS = {"input": (1, 1, -1, -1), "controller": (1, -1, 1, -1), "interaction": (2, -2, -2, 2)}
 
 
 def weights(factors: Factors, contrast: str) -> dict[str, float]:
@@ -14,8 +15,7 @@ def weights(factors: Factors, contrast: str) -> dict[str, float]:
     `input`: hand − joint, mean over both controllers. `controller`: MPC − none, mean over both inputs.
     `interaction`: (MPC − none with the hand) − (MPC − none with the joints).
     """
-    signs = {"input": (1, 1, -1, -1), "controller": (1, -1, 1, -1), "interaction": (2, -2, -2, 2)}[contrast]
-    return {mode: sign / 2.0 for mode, sign in zip(factors.modes, signs, strict=True)}
+    return {mode: sign / 2.0 for mode, sign in zip(factors.modes, _SIGNS[contrast], strict=True)}
 
 
 def detectable(design: StudyDesign, contrast: str, tasks: int = 0, tests: int = 0) -> float:
@@ -25,8 +25,8 @@ def detectable(design: StudyDesign, contrast: str, tasks: int = 0, tests: int = 
     the standard deviation that the design expects of a policy's success from draw to draw.
 
     Args:
-        design: of the study; it has factors, and two draws or more.
-        contrast: which.
+        design: Of the study; it has factors, and two draws or more.
+        contrast: Which.
         tasks: T; 0 for all of the study.
         tests: m; 0 for as many as are declared, 1 where nothing is.
     """
@@ -34,25 +34,22 @@ def detectable(design: StudyDesign, contrast: str, tasks: int = 0, tests: int = 
     assert factors is not None
     one = factors.sd**2 + _WORST / design.rollouts
     variance = one * sum(weight**2 for weight in weights(factors, contrast).values())
-    replicates = design.draws * (tasks or len(design.tasks))
-    return reach(tests or max(1, len(factors.primary)), design.draws - 1) * float(
-        np.sqrt(variance / replicates)
-    )
+    error = float(np.sqrt(variance / (design.draws * (tasks or len(design.tasks)))))
+    return reach(tests or max(1, len(factors.primary)), design.draws - 1) * error
 
 
 def plan(design: StudyDesign) -> str:
     """Return in words what is declared and what it can detect."""
-    if not design.factors or not design.factors.primary:
+    factors = design.factors
+    if not factors or not factors.primary:
         return "Nothing is declared: whatever comes out is exploratory."
-    names = ", ".join(design.factors.primary)
-    said = f"Declared: {names}, over {', '.join(design.tasks)} together, by Student's t over draws."
+    declared = f"Declared: {', '.join(factors.primary)}, over {', '.join(design.tasks)} together."
     if design.draws < 2:
-        return f"{said} One draw tests nothing."
-    single = {each: 100 * detectable(design, each, 1, 1) for each in CONTRASTS}
-    found = [f"{each} {100 * detectable(design, each):.0f}" for each in design.factors.primary]
+        return f"{declared} One draw tests nothing."
+    found = ", ".join(f"{each} {100 * detectable(design, each):.0f}" for each in factors.primary)
+    single = ", ".join(f"{each} {100 * detectable(design, each, 1, 1):.0f}" for each in CONTRASTS)
     return (
-        f"{said} {design.draws} draws of {design.rollouts} rollouts detect in 80 % of such studies, if a"
-        f" policy's success varies by {100 * design.factors.sd:g} points from draw to draw, after Holm:"
-        f" {', '.join(found)} points; one contrast of one task by itself, which is exploratory:"
-        f" {', '.join(f'{each} {points:.0f}' for each, points in single.items())}."
+        f"{declared} {design.draws} draws of {design.rollouts} rollouts detect in 80 % of such studies, if a"
+        f" policy's success varies by {100 * factors.sd:g} points from draw to draw, by Student's t after"
+        f" Holm: {found} points; one contrast of one task by itself, which is exploratory: {single}."
     )

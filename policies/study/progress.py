@@ -1,7 +1,6 @@
 """How a study stands: which jobs were done with its present settings, and what came of them."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -12,7 +11,7 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.storage import strict_json
-from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import StudyJob, StudyLayout, jobs
@@ -21,12 +20,7 @@ from handrail.policies.study.settings import evaluations, fingerprint
 
 @dataclass(frozen=True)
 class StudyProgress:
-    """What of a study is done; what is missing, or was made with other settings, is left out.
-
-    Attributes:
-        design: of the study.
-        layout: of its folder.
-    """
+    """What of a study is done; what is missing, or was made with other settings, is left out."""
 
     design: StudyDesign
     layout: StudyLayout
@@ -42,18 +36,14 @@ class StudyProgress:
         return [job.name for job in self.jobs if job.name not in self.done]
 
     def todo(self, only: str = "") -> list[StudyJob]:
-        """Return the jobs to be done: those that are missing, and recordings anew that they need.
+        """Return the jobs to be done, of one cell or all: what is missing, and recordings that it needs.
 
         A dataset that is gone is recorded again only for a policy that is still to be trained on it.
-
-        Args:
-            only: the name of a cell: its jobs alone; all where empty.
         """
         chosen = [job for job in self.jobs if only in ("", job.cell.name)]
-        missing = {job.name for job in chosen if job.name not in self.done}
-        needed = {name for job in chosen if job.name in missing for name in job.needs}
-        gone = {job.name for job in chosen if job.policy is None and not self._has_dataset(job)}
-        return [job for job in chosen if job.name in missing or job.name in needed & gone]
+        needed = {name for job in chosen if job.name not in self.done for name in job.needs}
+        gone = {job.name for job in chosen if job.name in needed and not self._has_dataset(job)}
+        return [job for job in chosen if job.name not in self.done or job.name in gone]
 
     def _has_dataset(self, job: StudyJob) -> bool:
         """Return whether the dataset that a job noted is still there, whole."""
@@ -106,10 +96,9 @@ def note_of(job: StudyJob, layout: StudyLayout) -> dict[str, Any]:
 
 def _has_rollouts(file: Path, config: EvaluateConfig) -> bool:
     """Return whether every seed was run under every condition."""
-    policies = read_evaluations([file]).values()
-    wanted = set(config.seeds)
-    whole = [policy for policy in policies for policy in policy.policies if wanted <= policy.rollouts.keys()]
-    return len(policies) == len(whole) == len(config.protections) * len(config.perturbations)
+    conditions, wanted = read_evaluations([file]).values(), set(config.seeds)
+    whole = [policy for each in conditions for policy in each.policies if wanted <= policy.rollouts.keys()]
+    return len(conditions) == len(whole) == len(config.protections) * len(config.perturbations)
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -119,11 +108,6 @@ def read_json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}
-
-
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a JSON object under its name at once."""
-    write_whole(path, (json.dumps(content, indent=1) + "\n").encode())
 
 
 def note_design(layout: StudyLayout, design: StudyDesign) -> None:

@@ -32,16 +32,11 @@ def _where(row: Rollout) -> str:
 
 @dataclass(frozen=True)
 class StudyCondition(Condition):
-    """All draws of one kind of policy under one treatment.
-
-    Attributes:
-        treatment: What disturbs or protects, `pushed` or `filter`; "" for neither.
-        learners: What each policy was trained on.
-    """
+    """All draws of one kind of policy under one treatment."""
 
     task: str
-    treatment: str
-    learners: tuple[StudyPolicy, ...]
+    treatment: str  # what disturbs or protects, `pushed` or `filter`; "" for neither
+    learners: tuple[StudyPolicy, ...]  # what each policy was trained on
 
     @cached_property
     def draws(self) -> Mapping[int, Policy]:

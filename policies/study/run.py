@@ -1,7 +1,6 @@
 """Runs a study: its jobs wherever the settings say, each in a process of its own."""
 
-import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from handrail.collect.execution.execution import Execution
@@ -22,11 +21,10 @@ from handrail.policies.study.settings import check_policies
 from handrail.policies.study.work import do
 
 _PRELOAD = ("handrail.policies.study.preload",)
+Work = Callable[[StudyJob, StudyDesign, Path], None]
 
 
-def run_study(
-    config: StudyConfig, work: Callable[[StudyJob, StudyDesign, Path], None] = do, isolated: bool = True
-) -> int:
+def run_study(config: StudyConfig, work: Work = do, isolated: bool = True) -> int:
     """Do what is not done yet, then write the report; return the exit code.
 
     Args:
@@ -45,52 +43,33 @@ def run_study(
     check_installed("handrail-study", ("torch", "accelerate"), design.policy)
     if config.page:
         with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
-    failed = False
-    with _alone_in(config):
-        if not config.report_only:
-            note_design(progress.layout, design)
-            if any(job.policy for job in progress.todo(config.only)):
-                check_policies(design)
-            with (
-                _going_on(),
-                Execution(config, f"study {design.name}", console, _PRELOAD, isolated) as execution,
-            ):
-                for result in execution.run(_todo(progress, work, config.only)):
-                    failed |= bool(result.error)
+    with explained(f"--output {config.output}: expected a folder that can be written"):
+        lock = DatasetLock(config.folder / ".study", "study", "handrail-study")
+    with lock:
+        done = config.report_only or _work(config, progress, console, work, isolated)
         from handrail.policies.study.report import write_study
 
         files = write_study(config, StudyProgress(design, progress.layout))
     console.print("Written: " + ", ".join(map(str, files)))
-    return FAILED if failed else 0
+    return 0 if done else FAILED
 
 
-def _todo(
-    progress: StudyProgress, work: Callable[[StudyJob, StudyDesign, Path], None], only: str
-) -> list[Job]:
-    """Return the jobs that are to be done, what matters most first; their logs begin anew."""
+def _work(
+    config: StudyConfig, progress: StudyProgress, console: Terminal, work: Work, isolated: bool
+) -> bool:
+    """Do what is to be done; return whether nothing failed."""
     design, layout = progress.design, progress.layout
-    todo = progress.todo(only)
+    note_design(layout, design)
+    todo = progress.todo(config.only)
+    if any(job.policy for job in todo):
+        check_policies(design)
     for job in todo:
         with explained(str(layout.log(job))):
             layout.log(job).unlink(missing_ok=True)  # of an earlier time
-    return [Job(job.name, work, (job, design, layout.root), job.needs, log=layout.log(job)) for job in todo]
-
-
-@contextlib.contextmanager
-def _alone_in(config: StudyConfig) -> Iterator[None]:
-    """Hold the study's folder, made if it is not there."""
-    with explained(f"--output {config.output}: expected a folder that can be written"):
-        lock = DatasetLock(config.folder / ".study", "study", "handrail-study")
+    jobs = [Job(job.name, work, (job, design, layout.root), job.needs, log=layout.log(job)) for job in todo]
     try:
-        yield
-    finally:
-        lock.release()
-
-
-@contextlib.contextmanager
-def _going_on() -> Iterator[None]:
-    """Say what an interrupted study comes to."""
-    try:
-        yield
+        with Execution(config, f"study {design.name}", console, _PRELOAD, isolated) as execution:
+            results = list(execution.run(jobs))
     except KeyboardInterrupt:
         raise KeyboardInterrupt("study: interrupted; the same command goes on where it was") from None
+    return not any(result.error for result in results)

@@ -15,9 +15,12 @@ from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 BATCH = 10  # episodes, until the next person has a turn
 _FPS = 20  # [Hz]
+_DATASET, _POLICY = Path("dataset"), Path("policy")  # of settings that are only looked at
 _RECORDED = ("task", "mode", "noise", "time_limit", "seed")
-_LEARNT = ("policy", "actions", "success_only", "episodes", "minutes", "draw", "seed")
-_ENDED = ("eval_split", "eval_steps", "patience", "improvement")
+_LEARNT = (
+    *("policy", "actions", "success_only", "episodes", "minutes", "draw", "seed"),
+    *("eval_split", "eval_steps", "patience", "improvement"),
+)
 _DRIVEN = ("episodes", "seed", "label", "protection", "perturbation", "time_limit")
 
 
@@ -27,16 +30,8 @@ def seed_of(design: StudyDesign, cell: StudyCell) -> int:
 
 
 def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
-    """Return how the next turn of a dataset is recorded.
-
-    Args:
-        cell: what is collected.
-        design: of the study.
-        root: folder of the dataset.
-        so_far: episodes in it.
-    """
+    """Return how the next turn of a dataset is recorded, `so_far` episodes being in it."""
     seen = design.pictures
-    pictured = {"cameras": ",".join(seen.cameras), "image_size": seen.size} if seen else {}
     return RecordConfig(
         task=cell.task,
         mode=cell.mode,
@@ -50,23 +45,17 @@ def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0)
         ),
         resume=root.exists(),
         workers=1,  # a job has one core
-        **pictured,
+        **({"cameras": ",".join(seen.cameras), "image_size": seen.size} if seen else {}),
     )
 
 
 def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
     """Return how a policy is trained."""
     task, timed, flat = design.tasks[policy.cell.task], policy.budget == "time", design.flat
-    ended = (
-        {
-            "eval_split": flat.held_out,
-            "eval_steps": flat.every,
-            "patience": flat.patience,
-            "improvement": flat.improvement,
-        }
-        if flat
-        else {}
-    )
+    ended: dict[str, Any] = {}
+    if flat:
+        ended = {"eval_split": flat.held_out, "eval_steps": flat.every}
+        ended |= {"patience": flat.patience, "improvement": flat.improvement}
     return TrainConfig(
         dataset=StoredConfig(root=str(dataset)),
         output=str(output),
@@ -87,13 +76,7 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
 
 
 def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> dict[str, EvaluateConfig]:
-    """Return how the policy of a job is driven, by condition.
-
-    Args:
-        job: that trains it.
-        design: of the study.
-        folder: of the policy.
-    """
+    """Return how the policy of a job, in a folder, is driven, by condition."""
     policy, more = job.policy, design.robustness
     assert policy is not None
     common: dict[str, Any] = {
@@ -119,41 +102,40 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     Of a dataset `recording` says what it is; `wanted` may grow. A policy depends on both, on its `training`
     and on its `evaluations`.
     """
+    cell, pictures = job.cell, design.pictures is not None
+    config, task = recording(cell, design, _DATASET), design.tasks[cell.task]
+    recorded = _some(config, _RECORDED) | {
+        "persons": design.persons,
+        "turn": BATCH,
+        "fps": config.dataset.fps,
+    }
+    recorded |= _some(config, ("cameras", "image_size") if pictures else ())
+    found = {"recording": recorded, "wanted": {"episodes": task.episodes, "minutes": task.minutes}}
     if job.policy is None:
-        return _of_cell(job.cell, design)
-    config = training(job.policy, design, Path("dataset"), Path("policy"))
-    seen = ("images", "scene") if design.pictures else ()
-    learnt = _some(config, (*_LEARNT, *_ENDED, *seen)) | {"sizes": as_json(resolved(config))}
+        return found
+    learnt = training(job.policy, design, _DATASET, _POLICY)
+    trained = _some(learnt, (*_LEARNT, *(("images", "scene") if pictures else ())))
     driven = {what: _some(each, _DRIVEN) for what, each in evaluations(job, design).items()}
-    return _of_cell(job.cell, design) | {"training": learnt, "evaluations": driven}
+    return found | {"training": trained | {"sizes": as_json(resolved(learnt))}, "evaluations": driven}
 
 
 def check_jobs(design: StudyDesign) -> None:
     """Check the settings of every job of a study before one begins."""
     for job in jobs(design):
         with _named(design, job):
-            recording(job.cell, design, Path("dataset")).check()
+            recording(job.cell, design, _DATASET).check()
             if job.policy:
-                training(job.policy, design, Path("dataset"), Path("policy")).check()
+                training(job.policy, design, _DATASET, _POLICY).check()
                 for config in evaluations(job, design).values():
                     config.check()
 
 
 def check_policies(design: StudyDesign) -> None:
     """Build the policy of every task once, untrained; loads PyTorch."""
-    firsts = {job.cell.task: job for job in reversed(jobs(design)) if job.policy}
-    for job in firsts.values():
+    firsts = {job.cell.task: (job, job.policy) for job in reversed(jobs(design)) if job.policy}
+    for job, policy in firsts.values():
         with _named(design, job):
-            assert job.policy is not None
-            check_policy(training(job.policy, design, Path("dataset"), Path("policy")))
-
-
-def _of_cell(cell: StudyCell, design: StudyDesign) -> dict[str, Any]:
-    task = design.tasks[cell.task]
-    config, turns = recording(cell, design, Path("dataset")), {"persons": design.persons, "turn": BATCH}
-    seen = ("cameras", "image_size") if design.pictures else ()
-    recorded = _some(config, (*_RECORDED, *seen)) | turns | {"fps": config.dataset.fps}
-    return {"recording": recorded, "wanted": {"episodes": task.episodes, "minutes": task.minutes}}
+            check_policy(training(policy, design, _DATASET, _POLICY))
 
 
 def _some(config: Any, names: tuple[str, ...]) -> dict[str, Any]:

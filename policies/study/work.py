@@ -1,7 +1,6 @@
 """Does one job of a study; whatever is killed goes on where it was."""
 
 import os
-import resource
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -19,24 +18,21 @@ from handrail.datasets.reading.digest import digest_of_dataset
 from handrail.datasets.reading.load import recorded_episodes
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
+from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
-from handrail.policies.study.progress import note_of, read_json, write_json
+from handrail.policies.study.progress import note_of, read_json
 from handrail.policies.study.settings import evaluations, fingerprint, recording, training
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
 
 
 def summary(root: Path, seed: int) -> dict[str, Any]:
-    """Return how much was recorded, how it ended, how good it is, and a digest of it all.
-
-    Args:
-        root: of the dataset.
-        seed: of what the metrics draw.
-    """
+    """Return how much was recorded, how it ended, how good it is, and a digest; `seed` is the metrics'."""
     episodes = recorded_episodes(root)
     measured = measure({"all": episodes}, np.random.default_rng(seed)).values
+    means = {name: each["all"].mean for name, each in measured.items()}
     failed = (episode.meta.get("failure_reason") for episode in episodes if not episode.success)
     return {
         "episodes": len(episodes),
@@ -45,9 +41,7 @@ def summary(root: Path, seed: int) -> dict[str, Any]:
         "frames": sum(episode.count for episode in episodes),
         "reasons": dict(Counter(str(reason or "not recorded") for reason in failed).most_common()),
         "digest": digest_of_dataset(root),
-        "quality": {
-            name: each["all"].mean for name, each in measured.items() if each["all"].mean is not None
-        },
+        "quality": {name: mean for name, mean in means.items() if mean is not None},
     }
 
 
@@ -70,9 +64,8 @@ def do(job: StudyJob, design: StudyDesign, root: Path) -> None:
 
 
 def _processor_time() -> float:
-    """Return what this process and those it waited for have used so far [s]."""
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(each.ru_utime + each.ru_stime for each in used)
+    """Return the time of a core that this process and those it waited for have used so far [s]."""
+    return sum(os.times()[:4])
 
 
 def begin(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:

@@ -4,6 +4,7 @@ import weakref
 
 import numpy as np
 import pytest
+from canned import canned
 from compare_helpers import handrail_dataset
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,8 +18,8 @@ from handrail.datasets.reading.load import read_demonstrations, recorded_episode
 
 
 @pytest.fixture(scope="module")
-def root(tmp_path_factory):
-    return handrail_dataset(tmp_path_factory.mktemp("readings") / "set", 3, "ee", 20)
+def root():
+    return canned(handrail_dataset, 3, "ee", 20)
 
 
 def test_what_is_measured_from_the_disk_is_what_is_measured_in_memory(root):

@@ -1,5 +1,6 @@
 """Shared by the tests of `handrail-compare`: datasets of another robot by plain LeRobot, and our own."""
 
+import json
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 from datasets_helpers import REPO, create
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from handrail.datasets.comparison.evaluations import FORMAT, Condition, Policy
 from handrail.datasets.comparison.policies import Pair, judge_pairs
 from handrail.datasets.format.schema import Feature
 
@@ -141,3 +143,32 @@ def check_texts(figure) -> None:
 def judge(conditions, baseline, rng):
     """Compare the success of all conditions with the baseline's."""
     return judge_pairs(conditions, [Pair(label, baseline) for label in conditions if label != baseline], rng)
+
+
+def condition(label, runs, contacts=False):
+    """Return a condition of policies whose rollouts are known; every other scene may have a contact."""
+    policies = []
+    for run in runs:
+        pairs = zip(run.seeds, run.values.tolist(), strict=True)
+        rollouts = {seed: {"success": value} for seed, value in pairs}
+        for seed in rollouts if contacts else ():
+            rollouts[seed]["contacts"] = seed % 2
+        policies.append(Policy(run.draw, run.training_seed, {}, rollouts))
+    return Condition(label, tuple(policies))
+
+
+def evaluations(path: Path, seeds: int, **shares) -> str:
+    """Write what policies did that succeed in about such shares of 60 scenes; `__` is a space."""
+    rng, arms = np.random.default_rng(0), {}
+    for label, share in shares.items():
+        trained_on = {"episodes": 12, "operator_time": 30.0}
+        arms[label.replace("__", " ")] = [
+            {
+                "training_seed": seed,
+                "trained_on": trained_on,
+                "rollouts": [{"seed": k, "success": bool(rng.random() < share)} for k in range(60)],
+            }
+            for seed in range(seeds)
+        ]
+    path.write_text(json.dumps({"format": FORMAT, "arms": arms}))
+    return str(path)

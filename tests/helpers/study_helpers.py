@@ -11,9 +11,9 @@ from places import ROOT
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT
+from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.study.jobs import StudyLayout, jobs
 from handrail.policies.study.load import load_design
-from handrail.policies.study.progress import write_json
 from handrail.policies.study.run import run_study
 from handrail.policies.study.settings import evaluations, fingerprint
 

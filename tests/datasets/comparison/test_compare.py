@@ -4,18 +4,16 @@ import csv
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import JOINTS, handrail_dataset, lerobot_dataset
+from compare_helpers import JOINTS, evaluations, handrail_dataset, lerobot_dataset
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.datasets.comparison.headline import cautions, headline
-from handrail.datasets.comparison.page import write_comparison
+from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.load import read_demonstrations
@@ -50,7 +48,7 @@ def mixed_report(foreign, ours, few_resamples, tmp_path_factory):
 
 def report(arguments, folder, **options):
     comparison = compare(CompareConfig(tuple(arguments), str(folder), **options))
-    files = write_comparison(comparison)
+    files = dataset_report(comparison).write(folder)
     return comparison, json.loads((folder / "report.json").read_text(), parse_constant=_no_constant), files
 
 
@@ -132,36 +130,15 @@ def test_nothing_is_claimed_where_nothing_differs(ours):
     assert headline(same).count("no difference detected") == 2
 
 
-def evaluations(path: Path, **shares) -> Path:
-    rng = np.random.default_rng(0)
-    content = {
-        label: [
-            {
-                "training_seed": seed,
-                "trained_on": {"episodes": 12, "operator_time": 30.0},
-                "rollouts": [{"seed": k, "success": bool(rng.random() < share)} for k in range(80)],
-            }
-            for seed in range(3)
-        ]
-        for label, share in shares.items()
-    }
-    path.write_text(json.dumps({"format": FORMAT, "arms": content}))
-    return path
-
-
-def test_policies_come_first(ours, tmp_path):
-    given = evaluations(tmp_path / "evaluations.json", quick=0.9, slow=0.5)
-    comparison = compare(CompareConfig(tuple(ours), str(tmp_path), evaluations=(str(given),)))
-    write_comparison(comparison)
-    content = json.loads((tmp_path / "report.json").read_text())
-    assert content["headline"] == headline(comparison)
-    assert content["headline"].startswith("Success of policies: slow")
+def test_what_policies_did_is_in_the_report(ours, tmp_path):
+    given = evaluations(tmp_path / "evaluations.json", 3, quick=0.9, slow=0.5)
+    _, content, _ = report(ours, tmp_path, evaluations=(given,))
     assert content["contrasts"][0]["nested"][1] < 0
     assert any("training seeds" in text for text in content["cautions"])
     assert content["policies"][0]["label"] == "quick"
-    wrong = evaluations(tmp_path / "wrong.json", telepathy=0.9)
+    wrong = evaluations(tmp_path / "wrong.json", 1, telepathy=0.9)
     with pytest.raises(HandrailError, match="unknown condition 'telepathy', expected one of quick, slow"):
-        compare(CompareConfig(tuple(ours), evaluations=(str(wrong),)))
+        compare(CompareConfig(tuple(ours), evaluations=(wrong,)))
 
 
 def test_columns_may_be_named(foreign):

@@ -4,14 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import judge, quick_and_slow
+from compare_helpers import condition, judge, quick_and_slow
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison import compare as comparing
 from handrail.datasets.comparison.collection import collected, success_difference
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.episodes import differences
-from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.policies import LIKE_FOR_LIKE, MIXED, Pair, judge_pairs, pairs_between
 from handrail.datasets.comparison.tables import metrics_table
@@ -29,6 +28,7 @@ from handrail.datasets.statistics.proportions import (
     paired_shares,
     unpaired_shares,
 )
+from handrail.datasets.statistics.resampling import Run
 
 OF_GROUP = [metric for metric in METRICS if metric.of_dataset]
 FEATURES = {
@@ -149,14 +149,14 @@ def test_pairs_are_all_episodes_or_none():
     assert measured.values["length"]["a"].known.size
 
 
-def condition_of(label, mean, policies, generator, scenes=100, luck=0.0, hard=0.0, difficulty=None):
-    """Policies that differ by `luck` of their training, in scenes that differ by `hard`."""
+def condition_of(label, mean, policies, generator, scenes=100, luck=0.0, difficulty=0.0):
+    """Policies that differ by `luck` of their training, in scenes that differ in `difficulty`."""
     found = []
     for seed in range(policies):
-        share = mean + luck * generator.normal() + (0.0 if difficulty is None else hard * difficulty)
-        values = generator.random(scenes) < np.clip(share, 0.0, 1.0)
-        found.append(Policy(0, seed, {}, {k: {"success": float(value)} for k, value in enumerate(values)}))
-    return Condition(label, tuple(found))
+        share = mean + luck * generator.normal() + difficulty
+        values = (generator.random(scenes) < np.clip(share, 0.0, 1.0)).astype(float)
+        found.append(Run(0, seed, tuple(range(scenes)), values))
+    return condition(label, found)
 
 
 @pytest.mark.parametrize(("policies", "luck"), [(1, 0.0), (3, 0.05), (3, 0.1), (5, 0.1)])
@@ -201,8 +201,8 @@ def test_an_interval_over_scenes_covers(quick, hard):
     """Three policies in the same 60 scenes: 95 % of 200 intervals should hold what any scenes give."""
     generator, covered, naive = rng(11), 0, 0
     for _ in range(200):
-        difficulty = generator.choice([-1.0, 1.0], size=60)
-        found = condition_of("a", 0.5, 3, generator, scenes=60, hard=hard, difficulty=difficulty)
+        difficulty = hard * generator.choice([-1.0, 1.0], size=60)
+        found = condition_of("a", 0.5, 3, generator, scenes=60, difficulty=difficulty)
         (outcome,) = judge({"a": found}, "a", generator).conditions
         covered += outcome.wilson[0] <= 0.5 <= outcome.wilson[1]
         low, high = wilson(outcome.successes, outcome.rollouts)

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from compare_helpers import judge
+from compare_helpers import condition, judge
 from scipy import stats
 
-from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.statistics.paired import paired_success
 from handrail.datasets.statistics.proportions import mcnemar_by_scene, paired_shares
 from handrail.datasets.statistics.replicates import (
@@ -31,14 +30,6 @@ def runs(shares, rollouts=100, draws=None):
         draw = draws[place] if draws else 0
         found.append(Run(draw, place, tuple(range(rollouts)), rng(place).permutation(values)))
     return found
-
-
-def condition_of(label, shares):
-    policies = [
-        Policy(0, run.training_seed, {}, {k: {"success": v} for k, v in enumerate(run.values.tolist())})
-        for run in runs(shares)
-    ]
-    return Condition(label, tuple(policies))
 
 
 def test_welch_knows_how_few_training_seeds_there_are():
@@ -68,9 +59,8 @@ def test_a_draw_of_the_dataset_is_one_replicate():
 
 def test_intervals_over_three_seeds_are_as_wide_as_t():
     """Resampling three numbers never leaves their range; Student's interval of three is 4.3 errors wide."""
-    found = judge(
-        {"a": condition_of("a", [0.9, 0.7, 0.5]), "b": condition_of("b", [0.4, 0.3, 0.2])}, "b", rng(0)
-    )
+    shares = {"a": [0.9, 0.7, 0.5], "b": [0.4, 0.3, 0.2]}
+    found = judge({label: condition(label, runs(each)) for label, each in shares.items()}, "b", rng(0))
     error, freedom = found.differences[0].errors[-1]
     low, high = t_interval(0.4, error, freedom)
     assert found.differences[0].nested == pytest.approx((low, high), abs=1e-6)
@@ -83,12 +73,9 @@ def test_an_interval_over_three_seeds_covers():
     generator, covered = rng(1), 0
     for _ in range(200):
         shares = np.clip(0.5 + 0.15 * generator.normal(size=3), 0.0, 1.0)
-        values = [generator.random(50) < share for share in shares]
-        policies = tuple(
-            Policy(0, place, {}, {k: {"success": float(v)} for k, v in enumerate(each)})
-            for place, each in enumerate(values)
-        )
-        (found,) = judge({"a": Condition("a", policies)}, "a", generator).conditions
+        values = [(generator.random(50) < share).astype(float) for share in shares]
+        found = [Run(0, place, tuple(range(50)), each) for place, each in enumerate(values)]
+        (found,) = judge({"a": condition("a", found)}, "a", generator).conditions
         covered += found.nested[0] <= 0.5 <= found.nested[1]
     assert covered >= 182
 

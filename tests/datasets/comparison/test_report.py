@@ -1,19 +1,16 @@
 """What the report shows: what is better is right, nothing is hidden at an edge, no title covers another."""
 
-import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import check_texts, handrail_dataset
+from compare_helpers import check_texts, evaluations, handrail_dataset
 from figure_helpers import drawn_numbers, shows
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.episodes import MetricContrast
-from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.datasets.comparison.figures import (
     answer_panels,
     draw_effect,
@@ -23,7 +20,7 @@ from handrail.datasets.comparison.figures import (
     turned,
 )
 from handrail.datasets.comparison.headline import headline
-from handrail.datasets.comparison.page import report_page
+from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.comparison.tables import collection_differences_table
 from handrail.datasets.presentation.drawing import new_figure, short
 from handrail.datasets.quality.catalogue import METRICS
@@ -43,7 +40,7 @@ def alike(ours, few_resamples):
 
 @pytest.fixture(scope="module")
 def page(alike):
-    return report_page(alike)
+    return dataset_report(alike).html
 
 
 @pytest.fixture(scope="module")
@@ -180,45 +177,28 @@ def test_the_headline_has_the_numbers_of_the_tables(ours):
         assert f"ratio {ratios}" in hourly
         for cell, said in ((difference, success), (ratio, hourly)):
             assert getattr(cell, "look", "") == ("detected" if ", a difference detected" in said else "")
-        low, high = comparison.ratios[other].interval or (np.nan, np.nan)
+        low, high = comparison.collecting[1].interval or (np.nan, np.nan)
         assert low < rate < high
 
 
 def test_policies_come_first_and_the_page_names_their_family(ours, tmp_path):
-    given = evaluated(tmp_path, quick=0.95, slow=0.3)
+    given = evaluations(tmp_path / "e.json", 4, quick=0.95, slow=0.3)
     for base, sign in (("quick", "−"), ("slow", "+")):
         comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
         said = headline(comparison)
         assert re.match(rf"Success of policies: .*; difference \{sign}\d+ to \{sign}\d+ points", said)
         assert said.endswith("detected.")
-    page = report_page(comparison)
+    page = dataset_report(comparison).html
     assert page.index(said) < page.index("1 like-for-like")
-
-
-def evaluated(folder: Path, **shares) -> str:
-    rng = np.random.default_rng(0)
-    arms = {
-        label.replace("__", " "): [
-            {
-                "training_seed": seed,
-                "rollouts": [{"seed": k, "success": bool(rng.random() < share)} for k in range(60)],
-            }
-            for seed in range(4)
-        ]
-        for label, share in shares.items()
-    }
-    path = folder / "evaluations.json"
-    path.write_text(json.dumps({"format": FORMAT, "arms": arms}))
-    return str(path)
 
 
 @pytest.mark.parametrize(("base", "label"), [("quick", "quick__intent"), ("slow", "quick")])
 def test_policies_come_first_also_with_one_condition(ours, tmp_path, base, label):
-    given = evaluated(tmp_path, **{label: 0.9})
+    given = evaluations(tmp_path / "e.json", 4, **{label: 0.9})
     comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
     said, name = headline(comparison), label.replace("__", " ")
     assert re.fullmatch(rf"Success of policies: {name} \d+ % \(95 % .*\), compared with no other\.", said)
-    page = report_page(comparison)
+    page = dataset_report(comparison).html
     cards = re.findall(r'<h3>(\w+)</h3><div class="big">(.*?)</div><small>(.*?)</small>', page)
     assert cards[0][1].endswith("%")
     assert cards[0][2].startswith("policy success")
@@ -228,7 +208,7 @@ def test_policies_come_first_also_with_one_condition(ours, tmp_path, base, label
 def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unlike, page):
     first = headline(unlike)
     assert first.startswith("The tasks and the robots differ: ")
-    said = re.sub(r"<style>.*?</style>|data:[^\"]*", "", report_page(unlike))
+    said = re.sub(r"<style>.*?</style>|data:[^\"]*", "", dataset_report(unlike).html)
     assert said.index(first) < said.index("<h2>")
     assert not JUDGED.search(said), JUDGED.findall(said)
     assert JUDGED.search(page)
@@ -238,7 +218,7 @@ def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unl
 
 
 def test_policies_of_unlike_tasks_do_not_come_before_that(ours, unlike, tmp_path):
-    given = evaluated(tmp_path, quick=0.95, slow=0.3)
+    given = evaluations(tmp_path / "e.json", 4, quick=0.95, slow=0.3)
     outcomes = compare(CompareConfig(tuple(ours), evaluations=(given,))).outcomes
     assert headline(replace(unlike, outcomes=outcomes)) == headline(unlike)
 

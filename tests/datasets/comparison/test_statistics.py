@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from compare_helpers import judge
+from compare_helpers import condition, judge
 from scipy.stats import fisher_exact
 
 from handrail.controllers.errors import HandrailError
@@ -137,28 +137,16 @@ def test_what_is_paired_stays_paired():
     assert np.array_equal(one, other)
 
 
-def evaluated(directory, **shares):
-    content = {
-        label: [
-            {
-                "training_seed": run.training_seed,
-                "rollouts": [
-                    {"seed": seed, "success": bool(value), "contacts": seed % 2}
-                    for seed, value in zip(run.seeds, run.values, strict=True)
-                ],
-            }
-            for run in runs(share, generator=rng(place))
-        ]
-        for place, (label, share) in enumerate(shares.items())
+def judged(**shares):
+    """Return the differences of conditions from `a`, whose policies succeed in about such shares."""
+    found = {
+        x: condition(x, runs(each, generator=rng(k)), True) for k, (x, each) in enumerate(shares.items())
     }
-    path = directory / "evaluations.json"
-    path.write_text(json.dumps({"format": FORMAT, "arms": content}))
-    return path
+    return judge(found, "a", rng())
 
 
-def test_a_clear_difference_is_detected_and_chance_is_not(tmp_path):
-    found = read_evaluations([evaluated(tmp_path, a=[0.9] * 4, b=[0.5] * 4, c=[0.88] * 4)])
-    outcomes = judge(found, "a", rng())
+def test_a_clear_difference_is_detected_and_chance_is_not():
+    outcomes = judged(a=[0.9] * 4, b=[0.5] * 4, c=[0.88] * 4)
     clear, none = outcomes.differences
     assert (clear.label, clear.detected, none.label, none.detected) == ("b", True, "c", False)
     assert clear.paired
@@ -174,7 +162,7 @@ def test_training_seeds_are_not_taken_for_a_difference_of_data():
         generator = rng(seed)
         drawn = {label: generator.uniform(0.3, 0.9, size=5) for label in "ab"}
         both = {label: runs(shares, 200, generator) for label, shares in drawn.items()}
-        outcome = judge({label: FakeCondition(label, each) for label, each in both.items()}, "a", generator)
+        outcome = judge({label: condition(label, each) for label, each in both.items()}, "a", generator)
         (difference,) = outcome.differences
         low, high = difference.interval or (np.nan, np.nan)
         rollouts += not low <= 0 <= high
@@ -183,29 +171,16 @@ def test_training_seeds_are_not_taken_for_a_difference_of_data():
     assert nested <= 4
 
 
-class FakeCondition:
-    """A condition without files."""
-
-    def __init__(self, label, members):
-        self.label, self._runs = label, members
-        self.outcomes = ("success",)
-        self.policies = [type("Policy", (), {"trained_on": {}})]
-
-    def runs(self, outcome="success"):
-        return self._runs
-
-
-def test_one_training_seed_says_nothing_of_training(tmp_path):
-    outcomes = judge(read_evaluations([evaluated(tmp_path, a=[0.9], b=[0.5])]), "a", rng())
+def test_one_training_seed_says_nothing_of_training():
+    outcomes = judged(a=[0.9], b=[0.5])
     (difference,) = outcomes.differences
     assert difference.nested is None
     assert outcomes.conditions[0].nested is None
 
 
-def test_two_training_seeds_are_too_few_where_they_differ_much(tmp_path):
+def test_two_training_seeds_are_too_few_where_they_differ_much():
     """Resampling two policies never leaves their range; Student's interval of two is 12 errors."""
-    outcomes = judge(read_evaluations([evaluated(tmp_path, a=[0.95, 0.75], b=[0.6, 0.4])]), "a", rng())
-    (difference,) = outcomes.differences
+    (difference,) = judged(a=[0.95, 0.75], b=[0.6, 0.4]).differences
     assert difference.nested[1] > 0
     assert difference.interval[1] < 0.0
     assert not difference.detected

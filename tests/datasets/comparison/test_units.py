@@ -11,7 +11,7 @@ from compare_helpers import JOINTS, arm_dataset, handrail_dataset, lerobot_datas
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.headline import cautions
-from handrail.datasets.comparison.page import report_page
+from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
@@ -159,7 +159,7 @@ def test_positions_at_scale_20_are_not_tested_against_velocities(scaled):
 
 def test_the_report_says_what_is_not_comparable_and_why(scaled):
     assert any("units may differ" in text for text in cautions(scaled))
-    page = report_page(scaled)
+    page = dataset_report(scaled).html
     assert ">tracking error</td><td>velocities against positions</td><td>not comparable: the names" in page
     assert "not comparable</td>" in page
 

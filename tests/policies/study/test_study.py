@@ -9,11 +9,12 @@ import pytest
 from study_helpers import DESIGN, Starter, run_here
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import Pictures
 from handrail.policies.study.jobs import jobs
 from handrail.policies.study.load import design_names, load_design
-from handrail.policies.study.progress import read_json, write_json
+from handrail.policies.study.progress import read_json
 from handrail.policies.study.settings import fingerprint, recording, training
 
 

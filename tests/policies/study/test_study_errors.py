@@ -7,7 +7,6 @@ import pytest
 from study_helpers import DESIGN, Starter, run_here
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.presentation.markdown import with_part
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.study import design as design_module
 from handrail.policies.study.config import StudyConfig
@@ -63,6 +62,17 @@ FACTORS = "[factors]\n" + "".join(
         (('["filter"]', '["fltr"]'), "unknown protection 'fltr'"),
         (("rollouts = 20\ndraws = 2", "draws = 3"), "robustness.draws expected at most 2 draws"),
         (("[tasks.reach]", "[tasks.reach"), "not valid TOML"),
+        (("rollouts = 40", "rollouts = true"), "rollouts"),
+        (("draws = 2", "draws = 0.5"), "draws"),
+        (("draws = 2", 'draws = 2\ndigest = "0"'), "digest"),
+        (("[beside]", "[[beside]]"), "beside"),
+        (('intents = ["ee"]', 'intents = "ee"'), "intents"),
+        (("steps = 10", f"steps = {10**30}"), "steps"),
+        (("minutes = 0.1", "minutes = inf"), "minutes"),
+        (("[robustness]", "[robustly]"), "robustly"),
+        (('baseline = "direct"', ""), "baseline"),
+        (('baseline = "direct"', 'baseline = "direct"\nname = "../x"'), "name"),
+        (("rollouts = 40", "persons = 0\nrollouts = 40"), "persons"),
     ],
 )
 def test_a_wrong_design_is_one_line(tmp_path, change, words):
@@ -113,15 +123,6 @@ def test_a_page_whose_marks_are_no_pair_is_left_alone_before_anything_begins(mar
     assert starter.begun == []
 
 
-def test_a_page_keeps_all_that_is_not_between_the_marks():
-    parts = [f"<!-- study {name} -->\n{name}\n<!-- end of study {name} -->" for name in "ab"]
-    old = "\n".join(["before", parts[0], "between", parts[1], "after"])
-    new = with_part(old, "study a", "new")
-    assert new == old.replace("\na\n", "\n\nnew\n\n")
-    assert with_part(new, "study a", "new") == new
-    assert with_part("text", "study c", "new").startswith("text\n")
-
-
 @pytest.mark.parametrize("place", ["file", "file/below", "/proc/nope"])
 def test_a_folder_that_cannot_be_is_one_line(place, tmp_path, preset):
     (tmp_path / "file").touch()
@@ -145,13 +146,6 @@ def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path,
     with pytest.raises(HandrailError, match=f"handrail-study: expected {missing}"):
         run_here(StudyConfig(preset, str(tmp_path / "study")), starter)
     assert starter.begun == []
-
-
-def test_a_cluster_may_be_asked_for_without_saying_anything_of_workers(monkeypatch):
-    monkeypatch.setattr("handrail.collect.execution.config.find_spec", lambda name: name)
-    StudyConfig(ray="auto").check_execution()
-    with pytest.raises(HandrailError, match="--ray auto and --workers 3: expected one of them"):
-        StudyConfig(ray="auto", workers=3).check_execution()
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,14 @@ import pytest
 from study_helpers import COLLECTED, DESIGN, Starter, changed, everything, run_here
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.imitation.training import presets
 from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import Flat
 from handrail.policies.study.jobs import jobs
 from handrail.policies.study.load import load_design
-from handrail.policies.study.progress import StudyProgress, is_done, read_json, write_json
+from handrail.policies.study.progress import StudyProgress, is_done, read_json
 from handrail.policies.study.settings import evaluations, fingerprint, recording
 from handrail.policies.study.work import begin, do, work
 

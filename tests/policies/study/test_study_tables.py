@@ -10,8 +10,7 @@ from handrail.policies.study import tables
 from handrail.policies.study.contrasts import DECLARED, contrasts
 from handrail.policies.study.design import Flat, Robustness
 from handrail.policies.study.figures import figures
-from handrail.policies.study.power import plan
-from handrail.policies.study.report import cautions, how
+from handrail.policies.study.report import cautions
 
 
 def test_what_ended_before_its_loss_was_flat_is_told(gathered):
@@ -52,10 +51,6 @@ def test_failures_are_counted_by_stage(gathered):
     for label, rollouts, count in table.rows:
         condition = results.find("reach", label)
         assert (int(rollouts), int(count)) == (80, 80 - int(condition.rolled().sum()))
-
-
-def test_how_to_read_it_ends_with_what_the_design_can_detect():
-    assert how(DESIGN).endswith(plan(DESIGN))
 
 
 def test_figures_show_what_was_found_and_no_text_covers_another(gathered):
