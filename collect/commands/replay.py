@@ -197,7 +197,8 @@ def _run(
     """
     states, onsets, contacts = list[FloatArray](), 0, 0
     observation, info = env.reset(seed=seed)
-    for frame, action in enumerate(actions.astype(np.float64)):
+    for frame in range(len(actions)):
+        action = actions[frame].astype(np.float64)
         states.append(observation["agent_pos"])
         before = np.array(env.state().commanded)
         command = Command(np.stack([before, action[:-1], np.zeros(len(before))]), 1.0 / fps)
