@@ -20,7 +20,7 @@ def evaluate(config: EvaluateConfig) -> int:
     check_installed("handrail-evaluate", ("torch",))
     from handrail.datasets.presentation.terminal import Terminal
     from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
-    from handrail.policies.imitation.evaluation.table import evaluation_table
+    from handrail.policies.imitation.evaluation.file import evaluation_table
 
     reasons: tuple[str, ...] = ()
     try:

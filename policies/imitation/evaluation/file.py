@@ -1,15 +1,31 @@
-"""The file that an evaluation writes, `handrail.evaluations/1`, and goes on from."""
+"""The file that an evaluation writes, `handrail.evaluations/1`, and goes on from; and its table."""
 
 import json
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.presentation.table import Table
+from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import read_json
 from handrail.policies.imitation.evaluation.conditions import PolicyCondition
+
+_HEADINGS = (
+    "condition",
+    "policies",
+    "success",
+    "95 %",
+    "time [s]",
+    "contacts / 100",
+    "brakes / 100",
+    "failures",
+)
 
 
 class EvaluationFile:
@@ -79,3 +95,43 @@ class EvaluationFile:
             if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == condition.checkpoint.key:
                 return entry
         return None
+
+
+def evaluation_table(content: Mapping[str, Any]) -> Table:
+    """Return a line a condition: success with its Wilson interval, time to it, contacts, brakes, why not.
+
+    Args:
+        content: of an evaluation file.
+    """
+    rollouts = [row for entries in content["arms"].values() for entry in entries for row in entry["rollouts"]]
+    lines = [
+        (label, str(len(entries)), *_cells([row for entry in entries for row in entry["rollouts"]]))
+        for label, entries in content["arms"].items()
+    ]
+    return Table(_HEADINGS, lines, str(content.get("task", "")), _caption(rollouts))
+
+
+def _cells(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    successes = sum(row["success"] for row in rows)
+    low, high = wilson(successes, len(rows))
+    times = [row["time_to_success"] for row in rows if "time_to_success" in row]
+    reasons = Counter(row.get("failure_reason") or "unknown" for row in rows if not row["success"])
+    return (
+        f"{successes}/{len(rows)} = {successes / len(rows):.0%}",
+        f"{low:.0%} – {high:.0%}",
+        f"{np.median(times):.1f}" if times else "–",
+        *(f"{100 * np.mean([row.get(name, 0) for row in rows]):.1f}" for name in ("contacts", "brakes")),
+        ", ".join(f"{reason} {count}" for reason, count in reasons.most_common()) or "none",
+    )
+
+
+def _caption(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Say what a step took, and what the intervals leave out."""
+    timed = [row["timing"] for row in rows if "timing" in row]
+    words = [
+        f"{part} {np.median([timing[part] for timing in timed]):.2f} ms"
+        for part in ("policy", "controller", "environment")
+        if timed
+    ]
+    said = f"time of a step, median: {', '.join(words)}; " if words else ""
+    return said + "intervals of the rollouts alone (Wilson); handrail-compare adds those of training"

@@ -36,8 +36,15 @@ from handrail.scripts.bench.rl.checkpoint import (
     write_checkpoint,
 )
 from handrail.scripts.bench.rl.config import TrainRlConfig
-from handrail.scripts.bench.rl.env import GoalReachingEnv, Reward
-from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
+from handrail.scripts.bench.rl.env import (
+    FINAL_SEED,
+    GoalReachingEnv,
+    Reward,
+    evaluate,
+    evaluation_goals,
+    means,
+    spreads,
+)
 
 _TARGET_ENTROPY = -3.0
 _PLACES = ("output_dir", "resume", "overwrite")  # of a run, not of what came out

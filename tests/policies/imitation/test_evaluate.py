@@ -14,7 +14,7 @@ from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
-from handrail.policies.imitation.evaluation.table import evaluation_table
+from handrail.policies.imitation.evaluation.file import evaluation_table
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
-from handrail.policies.imitation.evaluation.table import evaluation_table
+from handrail.policies.imitation.evaluation.file import evaluation_table
 from handrail.policies.imitation.interface.checkpoint import NAME
 
 FEATURES = {

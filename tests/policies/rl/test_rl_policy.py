@@ -9,7 +9,7 @@ from rl_helpers import random_actor
 from handrail.controllers.errors import HandrailError
 from handrail.policies.rl.observation import conditioning
 from handrail.policies.rl.policy import SHIPPED, Actor
-from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals
+from handrail.scripts.bench.rl.env import FINAL_SEED, evaluate, evaluation_goals
 
 
 def test_a_file_gives_the_same_actor_back(tmp_path):

@@ -12,8 +12,7 @@ from rl_helpers import TINY_RL
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.rl.policy import Actor
-from handrail.scripts.bench.rl.env import GoalReachingEnv
-from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means
+from handrail.scripts.bench.rl.env import FINAL_SEED, GoalReachingEnv, evaluate, evaluation_goals, means
 
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("tensorboard")
