@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import open_regular
 from handrail.controllers.robot.model import RobotModel
@@ -27,8 +26,8 @@ class MeshPiece:
     """A connected piece of a mesh: vertices, (k, 3) [m], faces of their indices, (f, 3), and its colour."""
 
     vertices: FloatArray
-    faces: NDArray[np.int64]
-    rgba: tuple[float, float, float, float]
+    faces: IntArray
+    rgba: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -64,41 +63,41 @@ def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
         link = arm.frames[item.parentFrame]
         frame = model.pinocchio.frames[model.pinocchio.getFrameId(link.name, pin.FrameType.BODY)]
         placement = frame.placement * (link.placement.inverse() * item.placement)
+        vertices, faces = _read_stl(path)
         rgba = colours.get(item.meshPath)
-        pieces = _pieces(path, item.meshScale) if rgba is None else _whole(path, item.meshScale, rgba)
+        if rgba is None:
+            pieces = tuple(_pieces(vertices, faces, item.meshScale))
+        else:
+            pieces = (MeshPiece(*_without_details(vertices * item.meshScale, faces), rgba),)
         yield PlacedMesh(item.name, link.name, frame.parentJoint, placement, pieces)
 
 
-def _whole(path: Path, scale: FloatArray, rgba: tuple[float, ...]) -> tuple[MeshPiece, ...]:
-    """Return a binary STL file as one piece of a colour, without details that nobody sees."""
-    vertices, faces = _read_stl(path)
-    vertices = vertices * scale
-    if len(faces) > _FINE:
-        vertices, index = np.unique((vertices / _GRID).round(), axis=0, return_inverse=True)
-        faces, vertices = index.ravel()[faces], vertices * _GRID
-        corners = np.sort(faces, axis=1)
-        whole = (corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2])
-        faces = faces[np.unique(np.where(whole[:, None], corners, 0), axis=0, return_index=True)[1]]
-        faces = faces[np.ptp(faces, axis=1) > 0]
-    return (MeshPiece(vertices, faces, (rgba[0], rgba[1], rgba[2], rgba[3])),)
+def _without_details(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return vertices and faces of a mesh; of a fine one without details that nobody sees."""
+    if len(faces) <= _FINE:
+        return vertices, faces
+    rounded, index = np.unique((vertices / _GRID).round(), axis=0, return_inverse=True)
+    faces = index.ravel()[faces]
+    corners = np.sort(faces, axis=1)
+    whole = (corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2])
+    faces = faces[np.unique(np.where(whole[:, None], corners, 0), axis=0, return_index=True)[1]]
+    return rounded * _GRID, faces[np.ptp(faces, axis=1) > 0]
 
 
-def _pieces(path: Path, scale: FloatArray) -> tuple[MeshPiece, ...]:
-    """Return the connected pieces of a binary STL file, without those that are flat."""
-    vertices, faces = _read_stl(path)
+def _pieces(vertices: FloatArray, faces: IntArray, scale: FloatArray) -> Iterator[MeshPiece]:
+    """Yield the connected pieces of a mesh, without those that are flat, coloured by their form."""
     edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]]])
     graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(vertices),) * 2)
     count, labels = connected_components(graph, directed=False)
-    parts = [_part(vertices, faces, labels == label) for label in range(count)]
-    solid = [part for part in parts if np.ptp(part[0], axis=0).min() > 1e-3]
-    colours = [_colour(vertices) if len(solid) > 1 else _JOINT for vertices, _ in solid]
-    return tuple(
-        MeshPiece(vertices * scale, faces, rgba)
-        for (vertices, faces), rgba in zip(solid, colours, strict=True)
-    )
+    kept = (labels == label for label in range(count))
+    solid = [keep for keep in kept if np.ptp(vertices[keep], axis=0).min() > 1e-3]
+    for keep in solid:
+        renumbered, own = np.cumsum(keep) - 1, vertices[keep]
+        rgba = _colour(own) if len(solid) > 1 else _JOINT
+        yield MeshPiece(own * scale, renumbered[faces[keep[faces[:, 0]]]], rgba)
 
 
-def _read_stl(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
+def _read_stl(path: Path) -> tuple[FloatArray, IntArray]:
     corners = _corners(path)
     if corners is None:
         raise HandrailError(f"mesh {path}: expected a binary STL file")
@@ -119,14 +118,7 @@ def _corners(path: Path) -> FloatArray | None:
     return corners
 
 
-def _part(
-    vertices: FloatArray, faces: NDArray[np.int64], keep: NDArray[np.bool_]
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    renumber = np.cumsum(keep) - 1
-    return vertices[keep], renumber[faces[keep[faces[:, 0]]]]
-
-
-def _colour(vertices: FloatArray) -> tuple[float, float, float, float]:
+def _colour(vertices: FloatArray) -> tuple[float, ...]:
     """Return a slender piece's colour, a tube's, a flat one's, a cap's, or a joint housing's."""
     low, middle, high = np.sort(np.ptp(vertices, axis=0))
     return _TUBE if high > 2.0 * middle else _CAP if low < 0.75 * middle else _JOINT

@@ -9,52 +9,38 @@ from handrail.controllers.registry import Registry
 
 @dataclass(frozen=True)
 class TaskSpec:
-    """A task: one entry makes it. What is `module:name` is imported when it is built.
+    """A task: one entry makes it. What is `module:name` is imported when it is built."""
 
-    Attributes:
-        name: as on the command line.
-        task: its class, a `Task`.
-        script: what a scripted person does, `(model, gains, drives) -> Script`.
-        help: one line.
-        objectives: what the masked MPC looks after by itself, `(channels) -> (Objective, …)`; None: nothing.
-        released_channels: channels of the tool that the operator leaves to them.
-        owned_channels: channels that an operator who drives the base by itself keeps nevertheless.
-        movers: whether obstacles can move in it: the class has `moving_obstacles`.
-    """
-
-    name: str
-    task: Callable[..., Any] | str
-    script: Callable[..., Any] | str
-    help: str
+    name: str  # as on the command line
+    task: Callable[..., Any] | str  # its class, a `Task`
+    script: Callable[..., Any] | str  # what a scripted person does, `(model, gains, drives) -> Script`
+    help: str  # one line
     objectives: Callable[..., Any] | str | None = None
-    released_channels: tuple[str, ...] = ()
+    """What the masked MPC looks after by itself, `(channels) -> (Objective, …)`; None: nothing."""
+    released_channels: tuple[str, ...] = ()  # channels of the tool that the operator leaves to them
     owned_channels: tuple[str, ...] = ()
-    movers: bool = False
+    """Channels that an operator who drives the base by itself keeps nevertheless."""
+    movers: bool = False  # whether obstacles can move in it: the class has `moving_obstacles`
 
 
 _TASKS, _SCRIPTS = "handrail.collect.world.tasks", "handrail.collect.operators.scripted"
+
+
+def _spec(name: str, task: str, help: str, **options: Any) -> TaskSpec:
+    """Return the spec of a task whose class and script are in modules of its name."""
+    return TaskSpec(name, f"{_TASKS}.{name}:{task}", f"{_SCRIPTS}.{name}:{task}Script", help, **options)
+
+
 TASKS = Registry(
     "task",
     TaskSpec,
     (
-        TaskSpec("drawer", f"{_TASKS}.drawer:Drawer", f"{_SCRIPTS}.drawer:DrawerScript", "pull it open"),
-        TaskSpec(
-            "pick_place",
-            f"{_TASKS}.pick_place:PickPlace",
-            f"{_SCRIPTS}.pick_place:PickPlaceScript",
-            "carry a cube into a bin",
-        ),
-        TaskSpec(
-            "reach",
-            f"{_TASKS}.reach:Reach",
-            f"{_SCRIPTS}.reach:ReachScript",
-            "bring the hand to a pose",
-            movers=True,
-        ),
-        TaskSpec(
+        _spec("drawer", "Drawer", "pull it open"),
+        _spec("pick_place", "PickPlace", "carry a cube into a bin"),
+        _spec("reach", "Reach", "bring the hand to a pose", movers=True),
+        _spec(
             "tray",
-            f"{_TASKS}.tray:Tray",
-            f"{_SCRIPTS}.tray:TrayScript",
+            "Tray",
             "carry a tray with a can on it",
             objectives=f"{_TASKS}.tray:level_tray",
             released_channels=("ee.wx", "ee.wy"),  # its tilt is the MPC's

@@ -83,17 +83,24 @@ def goal_reaching_prediction(channels: Channels) -> Prediction:
     return Smoothed(Bounded(channels), time_constant)
 
 
-def hand_intent(model: RobotModel) -> Asks:
-    """Return an operator who steers the hand: the twist goes on the tool's channels."""
+def _asks(
+    model: RobotModel, group: str, values_of: Callable[[FloatArray, State], FloatArray], mode: str
+) -> Asks:
+    """Return an operator who owns a group's channels and sends values made of twist and state on them."""
     channels = Channels.of(model.description)
-    mask = channels.mask("ee")
+    mask = channels.mask(group)
 
     def ask(twist: FloatArray, state: State, time: float) -> Intent:
         values = np.zeros(channels.size)
-        values[channels.tool_slice] = twist
-        return Intent(values, mask, mode="hand", time=time)
+        values[mask] = values_of(twist, state)
+        return Intent(values, mask, mode=mode, time=time)
 
     return ask
+
+
+def hand_intent(model: RobotModel) -> Asks:
+    """Return an operator who steers the hand: the twist goes on the tool's channels."""
+    return _asks(model, "ee", lambda twist, state: twist, "hand")
 
 
 def smoothed_hand_intent(model: RobotModel) -> Asks:
@@ -118,15 +125,8 @@ def joint_intent(model: RobotModel) -> Asks:
     What reaches the controller is a complete command, as direct control and safety filters expect it; nobody
     could do that by hand so well.
     """
-    channels, resolve = Channels.of(model.description), WholeBodyCompletion(model)
-    mask = channels.mask("joint")
-
-    def ask(twist: FloatArray, state: State, time: float) -> Intent:
-        values = np.zeros(channels.size)
-        values[channels.joint_slice] = resolve(state.q, state.v, twist, STEP)
-        return Intent(values, mask, mode="joints", time=time)
-
-    return ask
+    resolve = WholeBodyCompletion(model)
+    return _asks(model, "joint", lambda twist, state: resolve(state.q, state.v, twist, STEP), "joints")
 
 
 def mpc(model: RobotModel, period: float) -> Controller:
