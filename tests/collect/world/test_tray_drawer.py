@@ -146,7 +146,7 @@ def test_the_tray_has_to_be_left_on_the_table(grip, success):
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_tray_scenes_follow_their_description(robot):
     model, sides = load_model(robot), set()
-    for seed in SEEDS:
+    for seed in (*SEEDS, 160, 165):  # 165: the UR10 cannot hold the tray at the first place drawn
         episode = Tray().sample(model, np.random.default_rng(seed))
         table, tray = episode.scene.find("table"), episode.scene.find("tray")
         sides.add(float(np.sign(table.position[1])))
@@ -230,12 +230,3 @@ def test_features_are_named_and_finite():
             assert numbers.shape == (len(task.state_names),)
             assert np.isfinite(numbers).all()
             assert len(set(task.state_names)) == len(task.state_names)
-
-
-@pytest.mark.parametrize("seed", [160, 165])  # 165: the arm cannot hold the tray at the first place drawn
-def test_every_seed_has_a_start(seed):
-    episode = Tray().sample(MODEL, np.random.default_rng(seed))
-    hand, held = MODEL.pose(episode.q), episode.scene.objects[1]
-    assert np.allclose(hand.rotation[:, 2], [0.0, 0.0, -1.0], atol=1e-3)
-    assert np.allclose(hand.position - held.position, [0.0, 0.0, 0.2], atol=1e-6)  # the handle
-    assert 0.85 < hand.position[2] < 1.05
