@@ -27,7 +27,7 @@ from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
+from handrail.scripts.bench.goal_reaching.config import BASELINES
 
 TWISTS = arrays(float, 6, elements=st.floats(-0.2, 0.2))
 NEAR_HOME = arrays(float, 9, elements=st.floats(-0.3, 0.3)).map(lambda change: HOME + change)

@@ -22,8 +22,7 @@ from handrail.controllers.interface.command import Status
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.policies.imitation.evaluation.config import PROTECTIONS
 from handrail.scripts import cli
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
-from handrail.scripts.bench.goal_reaching.config import PROFILES
+from handrail.scripts.bench.goal_reaching.config import BASELINES, PROFILES
 
 FLOORS = ("controllers", "datasets", "collect", "policies")
 FILE = re.compile(rf"`((?:{'|'.join(FLOORS)}|scripts|tests|docs)/[\w/.]+)`")

@@ -18,7 +18,7 @@ from handrail.controllers.interface.prediction import Bounded, Prediction, Smoot
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
-from handrail.scripts.bench.goal_reaching.catalogue import TAKE_UP
+from handrail.scripts.bench.goal_reaching.config import TAKE_UP
 
 _NOW = np.zeros(1)  # no time ahead [s]
 

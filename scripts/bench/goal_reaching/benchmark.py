@@ -12,8 +12,7 @@ from handrail.datasets.presentation.markup import film, folded, page, panels, pa
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import write_json
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES, Baseline
-from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.config import BASELINES, Baseline, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.figures import CAPTIONS, Example, figures
 from handrail.scripts.bench.goal_reaching.metrics import measures_by_goal, summarise
 from handrail.scripts.bench.goal_reaching.run import available, goals, run, trace_of

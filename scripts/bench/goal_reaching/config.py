@@ -1,16 +1,73 @@
-"""Settings of the bench `goal_reaching`; light to import."""
+"""Settings of the bench `goal_reaching`, and who takes part in it, by name; light to import."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_names, names, one_of
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.registry import Registry, resolved
 from handrail.controllers.typed import AtLeastOne, Count
 from handrail.datasets.lists import Names
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
 from handrail.scripts.bench.report import ReportConfig
+
+_HERE = "handrail.scripts.bench.goal_reaching.baselines"
+_DIRECT = "handrail.controllers.baselines.direct:DirectController"
+_CBF = "handrail.controllers.baselines.cbf_filter:CbfFilter"
+_FILTER = "handrail.controllers.mpc.safety_filter:safety_filter"
+_MINK = "handrail.collect.world.mink:MinkController"
+_RL = "handrail.policies.rl.controller:RlController"
+TAKE_UP = (1.0, 0.65)  # time constants of the low-pass, of the hand's translation and turn [s]
+_JOINTS, _SMOOTHED = f"{_HERE}:joint_intent", f"{_HERE}:smoothed_hand_intent"
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A controller in the benchmark: one entry makes it. What is `module:name` is imported when it is built.
+
+    Functions are a module's own, so that worker processes find them.
+    """
+
+    name: str  # as on the command line
+    help: str  # one line
+    build: Callable[..., Any] | str  # `(model, period [s]) -> Controller`
+    operator: Callable[..., Any] | str = f"{_HERE}:hand_intent"
+    """What the planner's twist becomes, `(model) -> (twist, state, time) -> Intent`; anew an episode."""
+    period: float | None = None  # between two updates [s]; None: the planner's
+    aims: bool = False  # whether the controller needs to know the goal; then it has `aim(goal)`
+    lag: tuple[float, float] = (0.0, 0.0)
+    """Time constants of a low-pass before it, of the hand's translation and turn [s]; a planner that sees the
+    hand knows them."""
+
+    def controller(self, model: Any) -> Any:
+        """Return the controller of a robot."""
+        from handrail.collect.world.tasks.goal_reaching import STEP
+
+        return resolved(self.build)(model, self.period or STEP)
+
+
+BASELINES = Registry(
+    "baseline",
+    Baseline,
+    (
+        Baseline("mpc", "masked MPC", f"{_HERE}:mpc", period=0.1, lag=TAKE_UP),
+        Baseline("rl", "reinforcement-learning baseline (SAC)", _RL, aims=True),
+        Baseline("mink", "differential IK with collision avoidance (mink)", _MINK),
+        Baseline("mpc_paper", "masked MPC, the paper's horizon", f"{_HERE}:mpc_paper", period=0.09),
+        Baseline("rl_low_pass", "SAC behind the MPC's low-pass", _RL, _SMOOTHED, aims=True, lag=TAKE_UP),
+        Baseline("mink_low_pass", "mink behind the MPC's low-pass", _MINK, _SMOOTHED, lag=TAKE_UP),
+        Baseline("dls", "damped least squares, whole body", f"{_HERE}:whole_body"),
+        Baseline("dls_arm", "damped least squares on the arm, nominal base", f"{_HERE}:nominal_base"),
+        Baseline("decoupled", "decoupled base and arm", f"{_HERE}:base_following"),
+        Baseline("blended", "the mean of dls and dls_arm", f"{_HERE}:blended"),
+        Baseline("direct", "dls as joint commands, no controller", _DIRECT, _JOINTS),
+        Baseline("cbf_filter", "CBF safety filter on joint commands", _CBF, _JOINTS),
+        Baseline("safety_filter", "multi-step safety filter on joint commands", _FILTER, _JOINTS, 0.06),
+    ),
+)
+
 
 PROFILES = ("nominal", "fast15", "fast2", "fast3", "steps", "noise", "delay", "dropouts", "quantised")
 

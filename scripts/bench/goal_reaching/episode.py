@@ -20,8 +20,7 @@ from handrail.controllers.numerics.rotation import rotation_vector
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.datasets.recording.frames import Frame
-from handrail.scripts.bench.goal_reaching.catalogue import Baseline
-from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.config import Baseline, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.metrics import Trace
 from handrail.scripts.bench.goal_reaching.profiles import NOTHING_YET, SPEEDS, profile_commands
 from handrail.scripts.bench.goal_reaching.scenes import plant

@@ -15,8 +15,7 @@ from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.quality.metrics import path_length
 from handrail.datasets.statistics.paired import paired_difference, paired_success, wilson
 from handrail.scripts.bench.goal_reaching.baselines import goal_reaching_settings, paper_settings
-from handrail.scripts.bench.goal_reaching.catalogue import TAKE_UP, Baseline
-from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.config import TAKE_UP, Baseline, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.scenes import PHYSICS
 
 TABLE_I = {

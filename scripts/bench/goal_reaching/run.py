@@ -18,8 +18,7 @@ from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.scripts.bench.goal_reaching.catalogue import Baseline
-from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.config import Baseline, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.episode import Conditions, run_episode
 from handrail.scripts.bench.goal_reaching.metrics import Trace, measure
 from handrail.scripts.bench.goal_reaching.scenes import cluttered_floor, empty_floor

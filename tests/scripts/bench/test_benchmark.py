@@ -14,8 +14,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.scripts.bench.goal_reaching import figures as drawing
 from handrail.scripts.bench.goal_reaching.benchmark import benchmark, write_page
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
-from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.config import BASELINES, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.metrics import METRICS
 from handrail.scripts.bench.goal_reaching.run import available, conditions, goals, run, trace_of
 

@@ -17,8 +17,7 @@ from handrail.scripts.bench.goal_reaching.baselines import (
     hand_intent,
     smoothed_hand_intent,
 )
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
-from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.config import BASELINES, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.run import trace_of
 
 MODEL = load_model()

@@ -7,8 +7,7 @@ from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.robot.model import load_model
-from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
-from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.config import BASELINES, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.metrics import (
     METRICS,
     Trace,
