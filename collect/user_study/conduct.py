@@ -1,8 +1,9 @@
 """A participant's session: pages to read, forms to fill in, practice and trials."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 from handrail.collect.cockpit.cards import Cards
@@ -94,17 +95,12 @@ class Conductor:
         return self._practises(step) if step.kind == "practice" else self._tries(step)
 
     def _fills_in(self, step: Step) -> bool:
-        who = self._who
+        who, key = self._who, step.key
         asked = form(self._study, step.form, pairs_rng(self._study, who.session.slot, step.condition))
-        card = self._card(step.key, asked, pause=step.form != CONSENT)
-
-        def keep(item: str, value: Answer) -> None:
-            who.answer(step.key, item, value)
-
-        if self._ask(card, asked, who.answers(step.key), keep):
-            who.finish(step.key)
-            return True
-        return False
+        done = self._ask(key, asked, who.answers(key), partial(who.answer, key), pause=step.form != CONSENT)
+        if done:
+            who.finish(key)
+        return done
 
     def _is_introduced(self, step: Step) -> bool:
         """Return whether a participant has read what comes and goes on; the robot is made ready before."""
@@ -119,11 +115,10 @@ class Conductor:
         )
         place = self._who.session.modes.index(mode) + 1
         page = Form("instructions", f"Part {place} of {len(study.modes)}", text)
-        card = self._card(f"{mode}/{step.task}/instructions", page, keys=briefing.channels)
-        if self._ask(card, page, {}):
+        done = self._ask(f"{mode}/{step.task}/instructions", page, {}, keys=briefing.channels)
+        if done:
             self._ready = mode, step.task
-            return True
-        return False
+        return done
 
     def _practises(self, step: Step) -> bool:
         practice, mode, task = self._study.practice, step.condition, step.task
@@ -157,29 +152,31 @@ class Conductor:
         self._pauses += 1
         self._note("paused")
         asked, answers = Form("pause", "Paused", items=(_PAUSED,)), {}
-        card = self._card(f"pause/{self._pauses}", asked, pause=False)
-        return self._ask(card, asked, answers) and answers[_PAUSED.name] == _GO_ON
+        done = self._ask(f"pause/{self._pauses}", asked, answers, pause=False)
+        return done and answers[_PAUSED.name] == _GO_ON
 
     def _ask(
         self,
-        card: Mapping[str, Any],
+        key: str,
         asked: Form,
         answers: dict[str, Answer],
         keep: Callable[[str, Answer], None] = lambda item, value: None,
+        **look: Any,
     ) -> bool:
         """Return whether a form was filled in, not paused; an answer is kept before the page hears of it.
 
         Args:
-            card: of the form.
+            key: of the card.
             asked: the form.
             answers: so far; those to come are added.
             keep: puts an answer on the disk.
+            look: of the card.
         """
-        error = ""
+        card, error = self._card(key, asked, **look), ""
         while True:
             self._cards.show({**card, "answers": dict(answers), "error": error})
             for said in self._cards.hear():
-                if said.card != card["id"]:
+                if said.card != key:
                     continue  # of a card before, once more
                 if said.item == PAUSE:
                     return False

@@ -71,21 +71,6 @@ def test_the_second_who_comes_watches_and_may_be_given_the_wheel(new_page, tmp_p
         assert process.wait(60) == 0
 
 
-def test_anyone_who_sees_danger_may_stop_it(new_page, tmp_path):
-    """The e-stop of who watches counts; only who drives releases it."""
-    with recording(tmp_path / "d", "--task", "reach") as (process, address):
-        first, second = PageDriver(new_page(), address), PageDriver(new_page(), address)
-        first.begin()
-        second.press("Space")
-        first.expect_phase("STOPPED")
-        second.press("Enter")
-        assert not first.wait(lambda: first.phase != "STOPPED", 1.0)
-        first.press("Enter")
-        first.expect_phase("paused")
-        first.end(save="ArrowDown")
-        assert process.wait(60) == 0
-
-
 def test_the_page_says_stop_until_it_is_so(new_page):
     """Also when the connection breaks meanwhile; it is the same press all the time, and all that is said."""
     with server() as served, closing(Relay(served.address)) as relay:
