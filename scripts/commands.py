@@ -119,7 +119,7 @@ GROUPS: Mapping[str, Mapping[str, Program]] = {
                 "split": _edit("SplitConfig", "write --parts into folders of their own"),
                 "merge": Verb(
                     "write several datasets into one",
-                    "datasets.editing.pack_config:MergeConfig",
+                    "datasets.editing.config:MergeConfig",
                     "scripts.dataset:pack",
                 ),
                 "trim": _edit("TrimConfig", "cut off what is idle at both ends"),
@@ -127,7 +127,7 @@ GROUPS: Mapping[str, Mapping[str, Program]] = {
                 "rename": _edit("RenameConfig", "give the task another sentence, --task"),
                 "pack": Verb(
                     "write a dataset into few large files",
-                    "datasets.editing.pack_config:PackConfig",
+                    "datasets.editing.config:PackConfig",
                     "scripts.dataset:pack",
                 ),
                 "repair": Verb(

@@ -4,8 +4,7 @@ from handrail.collect.commands.config import InspectConfig, PushConfig, RepairCo
 from handrail.collect.commands.tables import quality_table, summary_table, worst_table
 from handrail.controllers.errors import FAILED
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.editing.config import EditConfig
-from handrail.datasets.editing.pack_config import MergeConfig, PackConfig, packing_advice
+from handrail.datasets.editing.config import EditConfig, MergeConfig, PackConfig, packing_advice
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.quality.worst import deletion, ranking_metric, worst_episodes
 from handrail.datasets.reading.check import check_report
@@ -50,7 +49,7 @@ def edit(config: EditConfig) -> None:
 def pack(config: PackConfig | MergeConfig) -> None:
     """Write one dataset, or several, into few large files."""
     roots, target = config.roots, config.target
-    from handrail.datasets.editing.pack import merge_datasets
+    from handrail.datasets.editing.merge import merge_datasets
 
     Terminal().print(str(merge_datasets(roots, target, config.name, config.verify)))
 
@@ -64,8 +63,7 @@ def repair(config: RepairConfig) -> int:
 
 def push(config: PushConfig) -> None:
     """Write a dataset's card, print what would be sent, and send it when asked."""
-    from handrail.datasets.editing.push import prepare, upload
-    from handrail.datasets.editing.store import copy
+    from handrail.datasets.editing.push import copy, prepare, upload
 
     dataset = config.dataset
     settings = config.license, config.private, config.verify, config.to

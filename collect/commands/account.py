@@ -15,7 +15,7 @@ from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
-from handrail.datasets.editing.pack_config import packing_advice
+from handrail.datasets.editing.config import packing_advice
 from handrail.datasets.presentation.terminal import Terminal
 
 _DROPPED = {

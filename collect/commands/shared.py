@@ -29,13 +29,13 @@ from handrail.collect.session.recorded import settings_json
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.typed import Count, decoded
-from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
+from handrail.datasets.editing.merge import copy_episodes
 from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.episode_rows import each_record
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord
-from handrail.datasets.recording.rewrite import settle, write_anew
+from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.atomic import beside, explained, remove, write_whole
@@ -164,12 +164,11 @@ class Shards:
         begin = next(lines)
         roots = [self.root] * bool(self._plan.first) + [_folder(jobs[0])]
         sources = [EditSource.open(root) for root in roots]
-        check_alike(sources[0], sources[-1])
-        manifest, types = sources[0].manifest, merged_types(sources)
-        new = (_pieces(job, found, manifest) for job, found in zip(jobs, chain([begin], lines), strict=True))
-        pieces = chain(sources[0].slices() if self._plan.first else (), chain.from_iterable(new))
+        manifest, shards = sources[0].manifest, zip(jobs, chain([begin], lines), strict=True)
+        new = chain.from_iterable(_slices(job, found, manifest) for job, found in shards)
+        slices = chain(sources[0].slices() if self._plan.first else (), new)
         try:
-            write_anew(self.root, manifest, pieces, types, merged_encodings(sources), in_place=True)
+            copy_episodes(sources, self.root, slices, in_place=True)
         except (pa.ArrowException, ValueError, KeyError) as error:
             raise HandrailError(f"{str(self.folder)!r} cannot be read: {message_of(error)}") from error
 
@@ -190,7 +189,7 @@ def _folder(job: Job) -> Path:
     return job.arguments[1]
 
 
-def _pieces(job: Job, lines: Sequence[EpisodeRecord], manifest: Manifest) -> Iterator[EpisodeSlice]:
+def _slices(job: Job, lines: Sequence[EpisodeRecord], manifest: Manifest) -> Iterator[EpisodeSlice]:
     """Yield the episodes of a shard."""
     folder = _folder(job)
     if len(lines) != job.size:

@@ -12,7 +12,7 @@ from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import plan
 from handrail.controllers.interrupts import Interrupts
-from handrail.datasets.editing.pack import drop_episodes
+from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
 

@@ -1,24 +1,124 @@
-"""What several datasets have in common, so that their episodes fit into one."""
+"""Datasets from episodes of others, in files of many episodes, in one pass: every edit is such a copy."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.source import EditSource
+from handrail.datasets.editing.source import EditSource, opened
+from handrail.datasets.format.episode_rows import row_files
 from handrail.datasets.format.info_file import Encodings
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.metadata import ColumnTypes
+from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
+from handrail.datasets.recording.slice import EpisodeSlice
+from handrail.datasets.storage.atomic import explained
 
 _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
 
 
-def check_alike(first: EditSource, other: EditSource) -> None:
-    """Check that frames of one dataset fit into another."""
-    names = str(other.layout.root), str(first.layout.root)
-    other.manifest.check_fits(first.manifest, f"merge: cannot add {names[0]!r} to {names[1]!r}")
+@dataclass(frozen=True)
+class Edited:
+    """A dataset that was written."""
+
+    root: Path
+    episodes: int
+    frames: int
+    before: int
+    """Number of frames of the datasets that it came from."""
+
+    def __str__(self) -> str:
+        return f"{self.root}: {self.episodes} episodes, {self.frames} frames (of {self.before})"
 
 
-def merged_types(sources: Sequence[EditSource]) -> ColumnTypes:
+def copy_episodes(
+    sources: Sequence[EditSource],
+    target: Path,
+    slices: Iterable[EpisodeSlice] | None = None,
+    name: str = "",
+    in_place: bool = False,
+    types: ColumnTypes | None = None,
+) -> Edited:
+    """Write episodes of datasets as one dataset with files of many episodes.
+
+    Args:
+        sources: The datasets.
+        target: Folder of the new dataset.
+        slices: The episodes, in order; all of the sources' without.
+        name: Of the new dataset, `owner/name`; that of the first source when empty.
+        in_place: Whether it replaces one of the sources.
+        types: Of the extra columns, where they are not those of all sources.
+    """
+    first = sources[0]
+    for other in sources[1:]:
+        other.manifest.check_fits(first.manifest, _refused(other, first))
+    manifest = replace(first.manifest, repo_id=name or first.manifest.repo_id)
+    manifest.check()
+    if slices is None:
+        slices = chain.from_iterable(source.slices() for source in sources)
+    types = types or _merged_types(sources)
+    totals = write_anew(target, manifest, slices, types, _merged_encodings(sources), in_place)
+    return Edited(target, totals.episodes, totals.frames, sum(source.info.frames for source in sources))
+
+
+def merge_datasets(
+    roots: Sequence[str | Path], output: str | Path, name: str = "", verify: bool = False
+) -> Edited:
+    """Write the episodes of datasets, in their order, as one dataset with files of many episodes.
+
+    Args:
+        roots: Their folders, one or more; some of several may have no episode yet.
+        output: Folder of the new dataset, missing or empty; or one of `roots`, which is replaced at once when
+            the new dataset is whole.
+        name: Of the new dataset, `owner/name`; that of the first folder when empty.
+        verify: Read every file of the datasets anew, also those that have not changed since the last check.
+    """
+    target = Path(output).expanduser().absolute()
+    given = [Path(root).expanduser().absolute() for root in roots]
+    real = [os.path.realpath(root) for root in given]
+    if twice := [str(root) for root, place in zip(given, real, strict=True) if real.count(place) > 1]:
+        raise HandrailError(f"merge: expected each folder once, got {twice[0]!r} twice")
+    places = [root for root in given if root == target or not _is_empty(root)] or given
+    with opened(places, target, verify) as sources:
+        return copy_episodes(sources, target, name=name, in_place=target in places)
+
+
+def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]) -> int:
+    """Remove episodes from a dataset that Handrail wrote, for good; return how many.
+
+    Args:
+        root: Its folder; removed too if no episode is left.
+        dropped: Says by an episode's row of metadata whether it goes.
+    """
+    root = Path(root).expanduser().absolute()
+    with explained(f"cannot write {str(root)!r}"):
+        settle(root)  # what was cut short is done; dropping the same again does no harm
+        if _is_empty(root):
+            return 0
+    with opened([root], root, verify=True) as (source,):
+        kept = [row["episode_index"] for row in source.rows if not dropped(row)]
+        if 0 < len(kept) < len(source.rows):
+            copy_episodes([source], root, source.slices(kept), in_place=True)
+        elif not kept:
+            remove_whole(root)
+        return len(source.rows) - len(kept)
+
+
+def _is_empty(root: Path) -> bool:
+    """Return whether a dataset was begun, and nothing has been recorded."""
+    return Layout(root).manifest.is_file() and not row_files(Layout(root))
+
+
+def _refused(other: EditSource, first: EditSource) -> str:
+    return f"merge: cannot add {str(other.layout.root)!r} to {str(first.layout.root)!r}"
+
+
+def _merged_types(sources: Sequence[EditSource]) -> ColumnTypes:
     """Return the extra columns that any of them has."""
     found: ColumnTypes = {}
     for source in sources:
@@ -27,26 +127,20 @@ def merged_types(sources: Sequence[EditSource]) -> ColumnTypes:
             if before != kind and {before, kind} == {pa.int64(), pa.float64()}:
                 found[name] = pa.float64()
             elif before != kind:
-                names = [source.layout.root, sources[0].layout.root]
-                raise _unlike(names, f"episode column {name!r}", kind, before)
+                said = f"its episode column {name!r} is {kind}, expected {before}"
+                raise HandrailError(f"{_refused(source, sources[0])}: {said}")
     return found
 
 
-def merged_encodings(sources: Sequence[EditSource]) -> Encodings:
+def _merged_encodings(sources: Sequence[EditSource]) -> Encodings:
     """Return how all videos are encoded: what they agree in; nothing where Handrail alone encoded them."""
-    found = {key: dict(encoding) for key, encoding in sources[0].encodings.items()}
+    found = dict(sources[0].encodings)
     for source in sources[1:]:
         for key, encoding in source.encodings.items():
-            mine = found.setdefault(key, dict(encoding))
+            mine = found.setdefault(key, encoding)
             for name in _NEEDED:
                 if mine.get(name) != encoding.get(name):
-                    names = [source.layout.root, sources[0].layout.root]
-                    raise _unlike(names, f"{name} of {key!r}", encoding.get(name), mine.get(name))
+                    said = f"its {name} of {key!r} is {encoding.get(name)}, expected {mine.get(name)}"
+                    raise HandrailError(f"{_refused(source, sources[0])}: {said}")
             found[key] = {name: value for name, value in mine.items() if encoding.get(name) == value}
     return found
-
-
-def _unlike(names: Sequence[object], thing: str, theirs: object, mine: object) -> HandrailError:
-    return HandrailError(
-        f"merge: cannot add {str(names[0])!r} to {str(names[1])!r}: its {thing} is {theirs}, expected {mine}"
-    )

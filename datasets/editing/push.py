@@ -1,4 +1,4 @@
-"""Sending a dataset, to the hub with LeRobot's own upload: only when asked, and only what may leave.
+"""Sending a dataset, to the hub with LeRobot's own upload or to a store: only when asked, and what may leave.
 
 What goes is LeRobot's dataset and the card. `.damaged/`, `.handrail/` and whatever else lies in the folder
 stay, and episodes of a user study's participants are not sent at all.
@@ -10,146 +10,61 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Any
 
+import fsspec
 import numpy as np
 from huggingface_hub.errors import HfHubHTTPError
 
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import regular
-from handrail.datasets.format.data_file import DataFiles, data_files
+from handrail.datasets.format.data_file import data_files
 from handrail.datasets.presentation.markdown import markdown_table, markdown_text
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.check import check_whole
-from handrail.datasets.reading.episode import Episode
 from handrail.datasets.reading.load import recorded_episodes
-from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
 from handrail.datasets.storage.atomic import explained, write_whole
 
 CARD = "README.md"
 TAGS = ("handrail", "teleoperation")
+SENT = (
+    *("data/chunk-*/file-*.parquet", "videos/*/chunk-*/file-*.mp4", "meta/episodes/chunk-*/file-*.parquet"),
+    *("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json"),
+    CARD,
+)
+_LAST = "meta/info.json"  # without it nobody takes a folder for a dataset
+_PARTICIPANT, _DEVICE = "participant", "teleop.device"
+_PEOPLE = "participants"  # the folder of a user study that has their answers
 _MARK = "<!-- written by handrail-edit push -->"
-_COUNTED = ("environment", "robot", "operator", "mode", "task")
+_COUNTED = ("environment", "robot", "operator", "mode")
 _NOTES = (
     "The operator steered a part of the motion (`teleop.mode`, `teleop.mask`); a controller completed the"
     " rest. `action` is what was sent to the robot. Handrail's `docs/recording.md` explains every column."
 )
 
 
-def description(root: Path) -> str:
-    """Return what was recorded, as Markdown: counts, modes, operators, success and metrics."""
-    episodes = recorded_episodes(root)
-    if not episodes:
-        raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
-    info = episodes[0].info
-    frames = sum(episode.count for episode in episodes)
-    lines = (
-        f"{len(episodes)} episodes, {frames} frames at {info.fps} Hz, {frames / info.fps / 60:.1f} minutes",
-        f"robot {markdown_text(info.robot_type) or DASH}",
-        *(f"{name}: {said}" for name in _COUNTED if (said := _counted(episodes, name))),
-        *_outcome(episodes),
-    )
-    listed = "\n".join(f"- {line}" for line in lines)
-    table = markdown_table(Table(("metric", "mean", "unit", "meaning"), _metrics(episodes)))
-    return f"{_MARK}\n\n{listed}\n\n{_NOTES if info.from_handrail else ''}\n\n{table}"
-
-
-def write_card(root: Path, repo_id: str, license_id: str) -> str:
-    """Write the card with LeRobot's template and return the description in it."""
-    path = root / CARD
-    if path.exists() and _MARK not in regular(path).read_text(encoding="utf-8", errors="replace"):
-        raise HandrailError(
-            f"{str(path)!r}: expected none, or one that handrail-edit push wrote; found another, which"
-            " LeRobot's upload would replace: give it another name"
-        )
-    from lerobot.datasets.io_utils import load_info
-    from lerobot.datasets.utils import create_lerobot_dataset_card
-
-    said = description(root)
-    try:
-        info = load_info(root)
-    except (AttributeError, TypeError, ValueError) as error:
-        raise HandrailError(f"dataset {str(root)!r}: LeRobot cannot read meta/info.json: {error}") from error
-    card = create_lerobot_dataset_card(
-        tags=list(TAGS),
-        dataset_info=info,
-        license=license_id,
-        repo_id=repo_id,
-        dataset_description=said,
-    )
-    with explained(f"cannot write {str(path)!r}"):
-        write_whole(path, str(card).encode())
-    return said
-
-
-def _counted(episodes: Sequence[Episode], name: str) -> str:
-    """Return the values of a column of metadata and how many episodes have each."""
-    values = Counter(value for episode in episodes for value in _values(episode, name))
-    return ", ".join(f"{markdown_text(str(value))} ({count})" for value, count in values.most_common())
-
-
-def _values(episode: Episode, name: str) -> Sequence[Any]:
-    if name == "task":
-        return episode.meta["tasks"]
-    value = episode.meta.get(name)
-    return [value] if value else []
-
-
-def _outcome(episodes: Sequence[Episode]) -> list[str]:
-    known = [episode.success for episode in episodes if episode.success is not None]
-    reasons = _counted([episode for episode in episodes if episode.success is False], "failure_reason")
-    lines = [f"success: {sum(known)} of {len(known)} ({percent(sum(known) / len(known))})"] if known else []
-    return lines + ([f"failures: {reasons}"] if reasons else [])
-
-
-def _metrics(episodes: Sequence[Episode]) -> list[list[str]]:
-    """Return a row for each metric of single episodes that applies."""
-    metrics = [metric for metric in METRICS if not metric.of_dataset]
-    values = measure({"": episodes}, np.random.default_rng(0), metrics=metrics).values
-    return [
-        [metric.title, number(values[metric.name][""].mean), metric.unit or DASH, metric.meaning]
-        for metric in metrics
-        if values[metric.name][""].known.size
-    ]
-
-
-SENT = (
-    *("data/chunk-*/file-*.parquet", "videos/*/chunk-*/file-*.mp4", "meta/episodes/chunk-*/file-*.parquet"),
-    *("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json"),
-    CARD,
-)
-_PARTICIPANT, _DEVICE = "participant", "teleop.device"
-_PEOPLE = "participants"  # the folder of a user study that has their answers
-
-
 @dataclass(frozen=True)
 class Upload:
-    """What is sent, or would be.
-
-    Attributes:
-        repo_id: Its name.
-        root: The dataset.
-        files: Of it, relative to its folder.
-        stays: Names in its folder of which nothing is sent.
-        size: Of all files [byte].
-        private: Whether nobody else sees it.
-        license_id: Its licence.
-        description: What the card says of it.
-        to: Where to, instead of the hub, or "".
-    """
+    """A dataset that is sent, or would be."""
 
     repo_id: str
     root: Path
     files: tuple[str, ...]
+    """Its files that are sent, relative to its folder."""
     stays: tuple[str, ...]
+    """Names in its folder of which nothing is sent."""
     size: int
+    """Of all files [byte]."""
     private: bool
+    """Whether nobody else sees it."""
     license_id: str
     description: str
+    """Its description on the card."""
     to: str = ""
+    """Its place, instead of the hub, or ""."""
 
     def __str__(self) -> str:
         stays = f"; these stay: {', '.join(self.stays)}" if self.stays else ""
@@ -173,20 +88,19 @@ def prepare(
     """
     root = root.absolute()
     check_whole(root, verify)
-    check_nobody(root)
-    said = write_card(root, repo_id, license_id)
-    found = [path for path in sorted(root.rglob("*")) if path.is_file()]
-    files = [path for path in found if is_sent(path.relative_to(root).as_posix())]
-    home = Path(os.path.realpath(root))
-    linked = [each for each in files if Path(os.path.realpath(each)) != home / each.relative_to(root)]
-    if linked:
+    _check_nobody(root)
+    said = _write_card(root, repo_id, license_id)
+    names = [path.relative_to(root).as_posix() for path in sorted(root.rglob("*")) if path.is_file()]
+    files = [name for name in names if any(fnmatch(name, pattern) for pattern in SENT) and name[0] != "."]
+    home = os.path.realpath(root)
+    if linked := [name for name in files if os.path.realpath(root / name) != os.path.join(home, name)]:
         raise HandrailError(
-            f"{str(linked[0])!r}: expected a file of the dataset, found a link; nothing is sent"
+            f"{str(root / linked[0])!r}: expected a file of the dataset, found a link; nothing is sent"
         )
-    tops, sent = ({path.relative_to(root).parts[0] for path in some} for some in (found, files))
-    names = tuple(path.relative_to(root).as_posix() for path in files)
-    size = sum(path.stat().st_size for path in files)
-    return Upload(repo_id, root, names, tuple(sorted(tops - sent)), size, private, license_id, said, to)
+    tops, sent = ({name.split("/")[0] for name in some} for some in (names, files))
+    size = sum((root / name).stat().st_size for name in files)
+    stays = tuple(sorted(tops - sent))
+    return Upload(repo_id, root, tuple(files), stays, size, private, license_id, said, to)
 
 
 def upload(push: Upload) -> None:
@@ -206,12 +120,34 @@ def upload(push: Upload) -> None:
         raise HandrailError(f"--upload: the hub did not take {push.repo_id}: {said}") from error
 
 
-def is_sent(name: str) -> bool:
-    """Return whether a file, by its path in the dataset, is one that goes to the hub."""
-    return any(fnmatch(name, pattern) for pattern in SENT) and not name.startswith(".")
+def copy(push: Upload) -> None:
+    """Copy a dataset to an address of a file system that fsspec knows: empty, or with a copy cut short."""
+    try:
+        system, place = fsspec.url_to_fs(push.to)
+        place = place.rstrip("/")
+        system.invalidate_cache()
+        found = system.find(place) if system.exists(place) else []
+        names = {path.removeprefix(f"{place}/") for path in found}
+        if _LAST in names or not names <= set(push.files):
+            raise HandrailError(
+                f"--to {push.to}: expected nothing there, or a copy of this dataset that was cut short; found"
+                f" {len(names)} files; choose another place"
+            )
+        for name in sorted(push.files, key=lambda name: name == _LAST):
+            target = f"{place}/{name}"
+            system.makedirs(target.rpartition("/")[0], exist_ok=True)
+            system.put_file(str(push.root / name), target)
+            sizes = (push.root / name).stat().st_size, system.size(target)
+            if sizes[0] != sizes[1]:
+                raise OSError(f"{name} has {sizes[1]} bytes there, expected {sizes[0]}")
+    except HandrailError:
+        raise
+    except Exception as error:  # every store fails in ways of its own
+        said = f"the dataset could not be copied there: {message_of(error)}"
+        raise HandrailError(f"--to {push.to}: {said}") from error
 
 
-def check_nobody(root: Path) -> None:
+def _check_nobody(root: Path) -> None:
     """Check that no episode is a participant's: data of people do not leave by a flag."""
     above = [folder for folder in root.parents[:4] if (folder / _PEOPLE).is_dir()]
     if above:
@@ -225,21 +161,15 @@ def check_nobody(root: Path) -> None:
             f"dataset {str(root)!r}: episodes {_few(people)} are of participants of a user study, which are"
             f" never sent; {advice}"
         )
+    suspects = [row for row in rows if _DEVICE in info.features and _PARTICIPANT not in row]
     with data_files() as files:
-        driven = [row for row in rows if _PARTICIPANT not in row and _driven(info, row, files)]
+        driven = [row for row in suspects if any(read_rows_of(info, row, [_DEVICE], files)[_DEVICE] != "")]
     unknown = [row["episode_index"] for row in driven]
     if unknown:
         raise HandrailError(
             f"dataset {str(root)!r}: people drove episodes {_few(unknown)}, and another tool has dropped who,"
             " so they may be of participants of a user study; send the dataset that Handrail recorded"
         )
-
-
-def _driven(info: DatasetInfo, row: dict[str, Any], files: DataFiles) -> bool:
-    """Return whether a person drove an episode."""
-    if _DEVICE not in info.features:
-        return False
-    return bool(np.any(read_rows_of(info, row, [_DEVICE], files)[_DEVICE] != ""))
 
 
 def _few(numbers: Sequence[int]) -> str:
@@ -251,3 +181,63 @@ def _few(numbers: Sequence[int]) -> str:
         else:
             runs.append([each, each])
     return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in runs)
+
+
+def _write_card(root: Path, repo_id: str, license_id: str) -> str:
+    """Write the card with LeRobot's template and return the description in it."""
+    path = root / CARD
+    if path.exists() and _MARK not in regular(path).read_text(encoding="utf-8", errors="replace"):
+        raise HandrailError(
+            f"{str(path)!r}: expected none, or one that handrail-edit push wrote; found another, which"
+            " LeRobot's upload would replace: give it another name"
+        )
+    from lerobot.datasets.io_utils import load_info
+    from lerobot.datasets.utils import create_lerobot_dataset_card
+
+    said = _description(root)
+    try:
+        info = load_info(root)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise HandrailError(f"dataset {str(root)!r}: LeRobot cannot read meta/info.json: {error}") from error
+    told = {"license": license_id, "repo_id": repo_id, "dataset_description": said}
+    card = create_lerobot_dataset_card(tags=list(TAGS), dataset_info=info, **told)
+    with explained(f"cannot write {str(path)!r}"):
+        write_whole(path, str(card).encode())
+    return said
+
+
+def _description(root: Path) -> str:
+    """Return what was recorded, as Markdown: counts, modes, operators, success and metrics."""
+    episodes = recorded_episodes(root)
+    if not episodes:
+        raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
+    info, metas = episodes[0].info, [episode.meta for episode in episodes]
+    frames = sum(episode.count for episode in episodes)
+    counted = {name: _counted([meta.get(name) for meta in metas]) for name in _COUNTED}
+    counted["task"] = _counted([task for meta in metas for task in meta["tasks"]])
+    ended = [episode.success for episode in episodes if episode.success is not None]
+    if ended:
+        counted["success"] = f"{sum(ended)} of {len(ended)} ({percent(sum(ended) / len(ended))})"
+    failed = [episode.meta.get("failure_reason") for episode in episodes if episode.success is False]
+    counted["failures"] = _counted(failed)
+    lines = (
+        f"{len(episodes)} episodes, {frames} frames at {info.fps} Hz, {frames / info.fps / 60:.1f} minutes",
+        f"robot {markdown_text(info.robot_type) or DASH}",
+        *(f"{name}: {said}" for name, said in counted.items() if said),
+    )
+    listed = "\n".join(f"- {line}" for line in lines)
+    metrics = [metric for metric in METRICS if not metric.of_dataset]
+    values = measure({"": episodes}, np.random.default_rng(0), metrics=metrics).values
+    rows = [
+        [metric.title, number(values[metric.name][""].mean), metric.unit or DASH, metric.meaning]
+        for metric in metrics
+        if values[metric.name][""].known.size
+    ]
+    table = markdown_table(Table(("metric", "mean", "unit", "meaning"), rows))
+    return f"{_MARK}\n\n{listed}\n\n{_NOTES if info.from_handrail else ''}\n\n{table}"
+
+
+def _counted(values: Sequence[object]) -> str:
+    """Return values and how many episodes have each; empty ones are left out."""
+    counts = Counter(value for value in values if value)
+    return ", ".join(f"{markdown_text(str(value))} ({count})" for value, count in counts.most_common())

@@ -1,46 +1,66 @@
 """A dataset that episodes are taken from: one that Handrail recorded, whole."""
 
-from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.episode_rows import EpisodeRows, ForeignRowError, read_column_types, row_files
 from handrail.datasets.format.info_file import Encodings, read_encodings
-from handrail.datasets.format.layout import Layout, episode_of
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest, read_manifest
 from handrail.datasets.format.metadata import ColumnTypes
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, with_success
+from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.folder import check_folders
+from handrail.datasets.recording.repair import tidy_locked
+from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.recording.slice import EpisodeSlice
+from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.lock import DatasetLock
 
 
 @dataclass(frozen=True)
 class EditSource:
-    """A dataset that was checked.
-
-    Attributes:
-        layout: Its paths.
-        manifest: Its schema.
-        types: Of its extra columns.
-        encodings: How its videos are encoded, where that is not as Handrail does it.
-        info: What it is.
-    """
+    """A dataset that was checked."""
 
     layout: Layout
     manifest: Manifest
     types: ColumnTypes
+    """Of its extra columns."""
     encodings: Encodings
+    """How its videos are encoded, where that is not as Handrail does it."""
     info: DatasetInfo
+
+    @classmethod
+    def open(cls, root: Path, verify: bool = False) -> "EditSource":
+        """Check a dataset; with `verify`, read every byte anew."""
+        info, layout = read_info(root), Layout(root)
+        foreign = (
+            f"dataset {str(root)!r}: expected one that Handrail wrote, got another tool's;"
+            " lerobot-edit-dataset edits it"
+        )
+        if not info.from_handrail:
+            raise HandrailError(foreign)
+        manifest = read_manifest(layout)
+        check_folders(layout)
+        check_whole(root, verify)
+        rows = row_files(layout)
+        if not rows:
+            raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
+        try:
+            EpisodeRows.read(rows[0])
+        except (ForeignRowError, FileNotFoundError) as error:
+            raise HandrailError(foreign) from error
+        return cls(layout, manifest, read_column_types(rows[0]), read_encodings(layout, manifest), info)
 
     @cached_property
     def rows(self) -> Sequence[dict[str, Any]]:
-        """EpisodeRows of metadata of its episodes, with `success` where that is known."""
+        """Rows of metadata of its episodes, with `success` where that is known."""
         return with_success(self.info, read_episodes(self.layout.root))
 
     @property
@@ -48,58 +68,43 @@ class EditSource:
         """How every episode ended; None where that is not known."""
         return [None if (said := row.get("success")) is None else bool(said) for row in self.rows]
 
-    @property
-    def tasks(self) -> list[str]:
-        """Its task sentences."""
-        return list(dict.fromkeys(task for row in self.rows for task in row["tasks"]))
+    def slices(self, numbers: Collection[int] | None = None) -> Iterator[EpisodeSlice]:
+        """Yield episodes in their order, one at a time; all of them without numbers."""
+        for path in row_files(self.layout):
+            try:
+                rows = EpisodeRows.read(path)
+                for place, row in enumerate(rows.rows):
+                    if numbers is None or row["episode_index"] in numbers:
+                        record = rows.record(place, with_stats=True)
+                        yield EpisodeSlice.of(self.layout, self.manifest, record)
+            except (OSError, ValueError, KeyError, IndexError) as error:
+                raise HandrailError(
+                    f"{str(path)!r} cannot be read ({error}); the dataset is damaged"
+                ) from error
 
-    @classmethod
-    def open(cls, root: Path, verify: bool = False) -> "EditSource":
-        """Check a dataset.
 
-        Args:
-            root: Its folder.
-            verify: Read every byte anew.
-        """
-        info, layout = read_info(root), Layout(root)
-        if not info.from_handrail:
-            raise _foreign(root, "no meta/handrail.json")
-        manifest = read_manifest(layout)
-        check_folders(layout)
-        check_whole(root, verify)
-        lines = row_files(layout)
-        if not lines:
-            raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
-        try:
-            EpisodeRows.read(lines[0])
-        except (ForeignRowError, FileNotFoundError) as error:
-            raise _foreign(root, "its meta/episodes has been rewritten") from error
-        types, encodings = read_column_types(lines[0]), read_encodings(layout, manifest)
-        return cls(layout, manifest, types, encodings, info)
-
-    def slices(self, numbers: Sequence[int] | None = None) -> Iterator[EpisodeSlice]:
-        """Yield episodes, one at a time; all of them without numbers."""
-        files = row_files(self.layout)
-        if numbers is None:
-            for path in files:
-                yield from self._slices(path)
+@contextmanager
+def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterator[list[EditSource]]:
+    """Provide datasets whose episodes go to a target, which nobody else writes if it is one of them."""
+    with explained(f"cannot write {str(target)!r}"):
+        if target not in roots:
+            if target.exists() and (not target.is_dir() or any(target.iterdir())):
+                raise HandrailError(
+                    f"--output {target}: expected a missing or empty folder, found one in use"
+                )
+            yield [EditSource.open(root, verify) for root in roots]
             return
-        slots = sorted(number for path in files if (number := episode_of(path)) is not None)
-        for slot, some in groupby(numbers, key=lambda number: slots[bisect_right(slots, number) - 1]):
-            yield from self._slices(self.layout.row(slot), [number - slot for number in some])
-
-    def _slices(self, path: Path, places: Sequence[int] | None = None) -> Iterator[EpisodeSlice]:
-        """Yield the episodes of a volume."""
-        try:
-            lines = EpisodeRows.read(path)
-            for place in range(len(lines)) if places is None else places:
-                yield EpisodeSlice.of(self.layout, self.manifest, lines.record(place, with_stats=True))
-        except (OSError, ValueError, KeyError, IndexError) as error:
-            raise HandrailError(f"{str(path)!r} cannot be read ({error}); the dataset is damaged") from error
-
-
-def _foreign(root: Path, why: str) -> HandrailError:
-    return HandrailError(
-        f"dataset {str(root)!r}: expected one that Handrail wrote, got another tool's ({why});"
-        " lerobot-edit-dataset edits it"
-    )
+        if settle(target):
+            raise HandrailError(
+                f"dataset {str(target)!r}: an edit was cut short, and is finished now; look at it"
+                f" (handrail-inspect {target}) before the next"
+            )
+        own = EditSource.open(target)
+        if own.layout.damaged.exists():
+            raise HandrailError(
+                f"dataset {str(target)!r}: in {own.layout.damaged.name} are episodes that were set aside;"
+                " some may have to go too: remove that folder"
+            )
+        with DatasetLock(own.layout.staging):
+            tidy_locked(own.layout, own.manifest, Checksums(target, anew=verify))
+            yield [own if root == target else EditSource.open(root, verify) for root in roots]

@@ -3,7 +3,7 @@
 import pytest
 from datasets_helpers import CAMERAS, create, frame_of, record
 
-from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.reading.digest import digest_of_dataset
 
 ROWS = 16  # letters of the digest of the rows

@@ -150,7 +150,9 @@ def test_a_merge_that_was_done_is_not_done_again(alone, tmp_path):
 
 def test_a_disk_that_is_full_when_the_shards_are_put_together_costs_no_episode(alone, tmp_path):
     root = tmp_path / "d"
-    with mock.patch("handrail.collect.commands.shared.write_anew", side_effect=OSError(ENOSPC, "it is full")):
+    with mock.patch(
+        "handrail.collect.commands.shared.copy_episodes", side_effect=OSError(ENOSPC, "it is full")
+    ):
         done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES, "--workers", 2)
     assert done.returncode == 1
     assert f"cannot write dataset {str(root)!r}: it is full" in done.stderr

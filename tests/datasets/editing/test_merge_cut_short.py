@@ -12,7 +12,7 @@ from editing_helpers import content, part
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.config import SplitConfig
 from handrail.datasets.editing.edit import edit
-from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.recording.rewrite import settle

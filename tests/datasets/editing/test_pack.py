@@ -24,7 +24,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.format import data_file
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report

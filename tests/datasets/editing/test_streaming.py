@@ -5,8 +5,8 @@ import warnings
 import pytest
 from datasets_helpers import CAMERAS, REPO, brightness, record
 
-from handrail.datasets.editing.pack import merge_datasets
-from handrail.datasets.editing.pack_config import packing_advice
+from handrail.datasets.editing.config import packing_advice
+from handrail.datasets.editing.merge import merge_datasets
 
 EPISODES = 3
 

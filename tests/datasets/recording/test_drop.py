@@ -4,7 +4,7 @@ import pytest
 from datasets_helpers import create, digest, length_of, open_with_lerobot, record_one, resume
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.pack import drop_episodes
+from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes, read_frames

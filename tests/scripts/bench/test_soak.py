@@ -9,7 +9,7 @@ import pytest
 from datasets_helpers import record
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.editing.merge import merge_datasets
 from handrail.scripts.bench.soak import whole
 
 
