@@ -9,8 +9,7 @@ import numpy as np
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.reading.columns import ColumnNames
-from handrail.datasets.reading.demonstration import Demonstration
-from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.demonstration import Demonstration, Episode
 from handrail.datasets.reading.load import each_opened, recorded_episodes
 from handrail.datasets.reading.reader import DatasetInfo, read_info
 

@@ -7,7 +7,7 @@ from handrail.datasets.comparison.groups import Group
 from handrail.datasets.format.info_file import fill
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.presentation.drawing import address
-from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.demonstration import Episode
 
 _SHOWN = 3  # episodes of a group
 _WIDTH = 240  # of a picture [pixels]

@@ -13,8 +13,7 @@ from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.columns import ColumnNames
-from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply, Episode
 from handrail.datasets.reading.load import recorded_episodes
 from handrail.datasets.statistics.contrast import SHARE
 from handrail.datasets.storage.strict_json import load_json

@@ -7,8 +7,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.quality.scale import Scale, embed
-from handrail.datasets.reading.demonstration import Demonstration
-from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.demonstration import Demonstration, Episode
 from handrail.datasets.reading.load import each_opened
 
 _SOME = 200  # episodes that stand for all of them where sizes are told apart

@@ -13,8 +13,7 @@ from handrail.datasets.quality.episode_set import EpisodeSet, frames_of
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.scale import Scale
 from handrail.datasets.quality.units import why_not
-from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply, Episode
 from handrail.datasets.reading.load import each_opened
 from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_mean
 

@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.demonstration import Episode
 from handrail.datasets.reading.load import recorded_episodes
 from handrail.datasets.reading.reader import DatasetInfo
 

@@ -1,5 +1,7 @@
 """One recorded episode, read by what its columns mean rather than by what they are called."""
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,7 +13,6 @@ from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import DataFiles
 from handrail.datasets.reading.columns import ColumnNames
-from handrail.datasets.reading.episode import Episode
 from handrail.datasets.reading.naming import (
     gripper_entry,
     is_velocity,
@@ -29,21 +30,48 @@ class DoesNotApply(HandrailError):  # noqa: N818, it says what the report says
     """
 
 
-@dataclass(frozen=True)
-class Demonstration(Episode):
-    """One episode with its rows. What it does not hold raises `DoesNotApply` with the reason.
-
-    Attributes:
-        number: of the episode in its dataset.
-        info: What the dataset is; it also tells the units of the numbers, as far as anything does.
-        frames: Columns, `(N,)` or `(N, d)`; no pictures.
-        meta: The episode's line of metadata.
-        columns: Which column plays which part.
-    """
+class Episode(ABC):
+    """One episode of a dataset: its row of metadata, whether its rows are at hand or not."""
 
     number: int
     info: DatasetInfo
+    meta: Mapping[str, Any]
+
+    @abstractmethod
+    def opened(self, files: DataFiles) -> "Demonstration":
+        """Return it with its rows; `files` opens the file that they are in."""
+
+    @property
+    def fps(self) -> float:
+        """Frames a second [Hz]."""
+        return self.info.fps
+
+    @property
+    def count(self) -> int:
+        """Number of frames."""
+        return int(self.meta["length"])
+
+    @property
+    def seconds(self) -> float:
+        """Duration, which is also the operator's time [s]."""
+        return self.count / self.fps
+
+    @property
+    def success(self) -> bool | None:
+        """How it ended, if that was recorded."""
+        value = self.meta.get("success")
+        return bool(value) if isinstance(value, bool | int | float) and math.isfinite(value) else None
+
+
+@dataclass(frozen=True)
+class Demonstration(Episode):
+    """One episode with its rows. What it does not hold raises `DoesNotApply` with the reason."""
+
+    number: int
+    info: DatasetInfo
+    """Its dataset; it also tells the units of the numbers, as far as anything does."""
     frames: Mapping[str, np.ndarray]
+    """Columns, `(N,)` or `(N, d)`; no pictures."""
     meta: Mapping[str, Any]
     columns: ColumnNames = field(default_factory=ColumnNames)
 

@@ -1,4 +1,4 @@
-"""The episodes of a dataset: by their lines of metadata, or with their rows."""
+"""The episodes of a dataset: by their rows of metadata, or with their rows."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -7,29 +7,21 @@ from typing import Any
 
 from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.reading.columns import ColumnNames
-from handrail.datasets.reading.demonstration import Demonstration
-from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.demonstration import Demonstration, Episode
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 from handrail.datasets.reading.simulated import kept_in_state, out_of_state
 
 
 @dataclass(frozen=True)
 class Recorded(Episode):
-    """An episode whose rows are on the disk; a thousand of them take the memory of their lines.
-
-    Attributes:
-        number: Of the episode in its dataset.
-        info: What the dataset is.
-        meta: The episode's line of metadata.
-        columns: Which column plays which part.
-        wanted: The columns that are read.
-    """
+    """An episode whose rows are on the disk; a thousand of them take the memory of their metadata."""
 
     number: int
     info: DatasetInfo
     meta: Mapping[str, Any]
     columns: ColumnNames
     wanted: tuple[str, ...]
+    """The columns that are read."""
 
     def opened(self, files: DataFiles) -> Demonstration:
         """Return it with its rows; see `Episode.opened`."""
