@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 os.environ["HF_HUB_OFFLINE"] = "1"
 os.environ.setdefault("HF_DATASETS_CACHE", str(Path(tempfile.gettempdir()) / "handrail-test-datasets"))
 
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
@@ -129,3 +131,13 @@ def check_pictures(dataset, rows) -> None:
         for place, key in enumerate(CAMERAS):
             expected = brightness(int(item["episode_index"]), int(item["frame_index"]), place)
             assert abs(float(item[key].mean()) * 255 - expected) < 2.5
+
+
+def fails(action, *words: str) -> None:
+    """Check that an action is refused in one line with some words."""
+    with pytest.raises(HandrailError) as caught:
+        action()
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message

@@ -3,30 +3,21 @@
 import pytest
 from datasets_helpers import (
     create,
+    fails,
     record,
     record_one,
     tree,
 )
 
-from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.repair import repair
 
 
-def _fails(action, *words):
-    with pytest.raises(HandrailError) as caught:
-        action()
-    message = str(caught.value)
-    assert "\n" not in message
-    for word in words:
-        assert word in message, message
-
-
 def test_an_existing_dataset_is_not_overwritten(tmp_path):
     root = record(tmp_path / "set", 1)
     before = tree(root)
-    _fails(lambda: create(root), str(root), "exists already", "resume", "overwrite")
+    fails(lambda: create(root), str(root), "exists already", "resume", "overwrite")
     assert tree(root) == before
 
 
@@ -56,7 +47,7 @@ def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
     (root / "images").mkdir()
     (root / "images" / "photo.png").write_text("mine too")
     before = tree(root)
-    _fails(lambda: create(root, overwrite=True), mine, "--overwrite", "only its own")
+    fails(lambda: create(root, overwrite=True), mine, "--overwrite", "only its own")
     assert tree(root) == before
     (root / mine).unlink()
     create(root, overwrite=True).close()
@@ -75,7 +66,7 @@ def test_a_dataset_of_another_tool_is_never_overwritten(tmp_path):
     root = record(tmp_path / "set", 1)
     Layout(root).manifest.unlink()
     before = tree(root)
-    _fails(lambda: create(root, overwrite=True), "not recorded by Handrail", "never removed")
+    fails(lambda: create(root, overwrite=True), "not recorded by Handrail", "never removed")
     assert tree(root) == before
 
 
@@ -84,7 +75,7 @@ def test_a_folder_that_is_no_dataset_is_never_removed(tmp_path, overwrite):
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
     before = tree(tmp_path)
-    _fails(lambda: create(tmp_path / "thesis", overwrite=overwrite), "chapter.tex", "never removed")
-    _fails(lambda: create(tmp_path, overwrite=overwrite), "thesis", "never removed")
-    _fails(lambda: create(tmp_path / "thesis" / "chapter.tex", overwrite=overwrite), "is a file")
+    fails(lambda: create(tmp_path / "thesis", overwrite=overwrite), "chapter.tex", "never removed")
+    fails(lambda: create(tmp_path, overwrite=overwrite), "thesis", "never removed")
+    fails(lambda: create(tmp_path / "thesis" / "chapter.tex", overwrite=overwrite), "is a file")
     assert tree(tmp_path) == before
