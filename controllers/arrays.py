@@ -1,5 +1,6 @@
 """Array types, and the checked, read-only copy that every value in the house is made of."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,11 @@ def frozen(values: ArrayLike, dtype: Any = np.float64, what: str = "an array") -
         array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
+
+
+def are_finite(values: FloatArray) -> bool:
+    """Whether all values are finite numbers, (n,); where they are, their squares mostly say so at once."""
+    return math.isfinite(values.dot(values)) or bool(np.isfinite(values).all())
 
 
 def real(value: Any, what: str) -> float:

@@ -18,7 +18,6 @@ from handrail.collect.world.stage import add_scene
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interface.controller import State
-from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
@@ -233,20 +232,24 @@ def _pose(position: FloatArray, rotation: FloatArray) -> Pose:
     return Pose(position.copy(), rotation.reshape(3, 3).copy())
 
 
-@exact_jit
-def _ramp(control, before, after, shares, servos, fingers):
+def _ramp(
+    control: FloatArray,
+    before: FloatArray,
+    after: FloatArray,
+    shares: FloatArray,
+    servos: IntArray,
+    fingers: tuple[int, float, float],
+) -> FloatArray:
     """Return what servos are sent at every substep, (substeps, servos).
 
     That is on the way from one velocity to another; the fingers' servo goes towards their opening.
     """
     ramp = np.empty((len(shares), len(control)))
+    ramp[:, servos] = np.outer(1.0 - shares, before) + np.outer(shares, after)
     finger, opening, reach = fingers
-    for k in range(len(shares)):
-        for joint in range(len(servos)):
-            ramp[k, servos[joint]] = (1.0 - shares[k]) * before[joint] + shares[k] * after[joint]
-        if finger >= 0:
-            way = opening - control[finger]
-            ramp[k, finger] = control[finger] + min(max(way, -(reach * shares[k])), reach * shares[k])
+    if finger >= 0:
+        way = opening - control[finger]
+        ramp[:, finger] = control[finger] + np.minimum(np.maximum(way, -(reach * shares)), reach * shares)
     return ramp
 
 

@@ -1,20 +1,16 @@
-"""Signed distances and their gradients: coal's shapes on pinocchio's model."""
+"""Signed distances and their gradients, by the compiled core; coal measures shapes whose cores meet."""
 
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.collision.distance_kernels import gradients, lower_bounds, raise_bounds, take
-from handrail.controllers.collision.pair_data import PairData
 from handrail.controllers.collision.shape_pairs import ShapePairs
 from handrail.controllers.collision.slacks import MOVING, OWN, STANDING
+from handrail.controllers.core.library import functions
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
-
-_STRETCH = 13  # configurations after which all pairs are measured again
 
 
 @dataclass(frozen=True)
@@ -33,9 +29,7 @@ class Distances:
 
 
 class CollisionModel:
-    """Measures the pairs that must keep apart.
-
-    See shape_pairs.py for which these are, and distance_kernels.py for distances and their gradients.
+    """Measures the pairs that must keep apart; see shape_pairs.py for which these are.
 
     Attributes:
         pairs: names of the two shapes of each pair, (P,) of (str, str).
@@ -43,30 +37,22 @@ class CollisionModel:
         largest_margin: the largest margin that a pair can keep [m], (P,).
         held: rows of the pairs with something that the hand holds, (H,).
         kinds: whether a pair is OWN, STANDING or MOVING (slacks.py), (P,).
+        memory: the compiled core's `Scene`.
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...] = ()) -> None:
         self._robot = model
-        self._model = model.pinocchio
         self._shapes = ShapePairs(model, obstacles)
-        self._geometry = self._shapes.geometry
         self._kept = _kept(obstacles)
-        self._moving: list[Obstacle] = []
         self.pairs = self._shapes.names
         self.work = self._shapes.work
         self.largest_margin = self._shapes.largest_margin
         self.held = self._shapes.held
-        self._moves = self._shapes.moves  # (P, 2, n)
-        self._motion_bounds = self._shapes.motion_bounds  # (n, P), which `update_scene` brings up to date
-        self._data = self._model.createData()
-        self._every = np.arange(len(self.pairs))
-        neutral = pin.neutral(self._model)
-        self._all, self._along, self._after = (
-            PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
-        )
-        self._last: tuple[FloatArray, FloatArray] | None = None  # trajectory, and distances along it
-        self._now: tuple[FloatArray, ...] | None = None  # first of these, and what was found there
-        self._take_speeds(obstacles)
+        self.memory = self._shapes.memory
+        self.memory.fields.now_changes = -1
+        self.kinds = self.memory.slack
+        self._everything = np.full(self.size, np.inf)
+        self._take_kinds()
 
     @property
     def size(self) -> int:
@@ -76,62 +62,32 @@ class CollisionModel:
     @property
     def any_moving(self) -> bool:
         """Whether any obstacle moves."""
-        return bool(self._moving)
+        return bool(self.memory.speed.any())
 
     def distances(
         self, q: FloatArray, within: FloatArray | float = np.inf, times: FloatArray | None = None
     ) -> Distances:
         """Return the signed distances along a trajectory, and gradients of those below `within`.
 
-        On every stretch of the way a pair that cannot come below its limit is measured at the beginning only;
-        after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`,
-        or what the last trajectory's distances leave of it: the next one is seldom far from it.
+        A pair that cannot come below its limit on its way from the first configuration, or from the one
+        before, is not measured: its value is a lower bound (core/scene.c).
 
         Args:
             q: configurations, (K, n).
             within: the largest distance whose gradient is wanted, for all pairs or each, (P,) [m].
             times: of the configurations from now on, (K,) [s]; moving obstacles are where they will be then.
         """
-        if not self.size:
-            nothing = np.zeros((0, 2), dtype=int), np.zeros((0, self._model.nv))
-            return Distances(np.zeros((len(q), 0)), *nothing)
-        times = np.zeros(len(q)) if times is None else times
-        limits = within if isinstance(within, np.ndarray) else np.full(self.size, float(within))
-        witnesses = np.empty((len(q), self.size, 9))
-        jacobians = np.empty((len(q), 6, self._model.nv))
-        values = np.empty((len(q), self.size))
-        for begin in range(0, len(q), _STRETCH):
-            stretch = slice(begin, begin + _STRETCH)
-            first = slice(begin, begin + 1)
-            found = witnesses[first], values[first], jacobians[first]
-            if begin or not self._recall(q[0], found):
-                self._measure(self._all, self._every, q[first], times[first], *found)
-            if not begin and not self._moving:
-                self._now = q[0].copy(), *(each.copy() for each in found)
-            ahead = times[stretch] - times[begin]
-            bounds, close = lower_bounds(
-                values[begin], q[begin], q[stretch], ahead, self._motion_bounds, self._speeds, limits
-            )
-            if self._last is not None and self._last[0].shape == q.shape:
-                there, known = self._last[0][stretch], self._last[1][stretch]
-                close = raise_bounds(bounds, q[stretch], known, there, self._motion_bounds, limits)
-            chosen = self._along.select(close)
-            if len(chosen):
-                after = slice(begin + 1, begin + len(bounds))
-                found = witnesses[after], bounds[1:], jacobians[after]
-                self._measure(self._along, chosen, q[after], times[after], *found)
-            values[stretch] = bounds
-        self._last = None if self._moving else (q.copy(), values.copy())
-        near, rows = gradients(witnesses, jacobians, self._moves, values, limits)
-        return Distances(values, near, rows)
-
-    def _recall(self, q: FloatArray, found: tuple[FloatArray, ...]) -> bool:
-        """Write what was found at a configuration, (n,), if it is the one that was measured last."""
-        if self._now is None or not np.array_equal(self._now[0], q):
-            return False
-        for target, known in zip(found, self._now[1:], strict=True):
-            target[:] = known
-        return True
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        count, n = q.shape
+        times = np.zeros(count) if times is None else times
+        limits = np.broadcast_to(np.asarray(within, dtype=np.float64), self.size).copy()
+        values = np.empty((count, self.size))
+        near, gradients = np.empty((count * self.size, 2), dtype=np.int64), np.empty((count * self.size, n))
+        found = functions().scene_distances(
+            self.memory, count, q, times, limits, None, None, 0, values, near, gradients
+        )
+        self.check()
+        return Distances(values, near[:found].copy(), gradients[:found].copy())
 
     def values(
         self,
@@ -149,72 +105,29 @@ class CollisionModel:
                 below their limit then get a lower bound instead, infinitely cheaper.
             within: distance below which a pair's own value is wanted then, (P,) [m].
         """
-        if not self.size:
-            return np.empty((len(q), 0))
-        times = np.zeros(len(q)) if times is None else times
-        if now is None:
-            data, chosen, values = self._all, self._every, np.empty((len(q), self.size))
-        else:
-            data, (start, there) = self._after, now
-            values, close = lower_bounds(there, start, q, times, self._motion_bounds, self._speeds, within)
-            if not close.any():
-                return values
-            chosen = data.select(close)
-        witnesses = np.empty((len(q), self.size, 9))
-        self._measure(data, chosen, q, times, witnesses, values)
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        times, values = np.zeros(len(q)) if times is None else times, np.empty((len(q), self.size))
+        limits = self._everything if within is None else within
+        functions().scene_values(self.memory, len(q), q, times, *(now or (None, None)), limits, values)
+        self.check()
         return values
 
-    def _measure(
-        self,
-        data: PairData,
-        chosen: IntArray,
-        q: FloatArray,
-        times: FloatArray,
-        witnesses: FloatArray,
-        values: FloatArray,
-        jacobians: FloatArray | None = None,
-    ) -> None:
-        """Let coal compute some pairs at configurations, with moving obstacles where they are then.
-
-        Args:
-            data: of the pairs.
-            chosen: their indices.
-            q: configurations, (K, n).
-            times: of them from now on, (K,) [s].
-            witnesses: filled with normals and nearest points, (K, P, 9).
-            values: filled with signed distances, (K, P) [m].
-            jacobians: filled with the joints' spatial Jacobians, if wanted, (K, 6, n).
-        """
-        model, kinematics, geometry = self._model, self._data, self._geometry
-        for k in range(len(q)):
-            if self._moving:
-                for obstacle in self._moving:
-                    self._shapes.place(obstacle, times[k])
-            pin.computeDistances(model, kinematics, geometry, data.geometry, q[k])
-            take(data.read(), chosen, k, witnesses, values)
-            if jacobians is not None:
-                jacobians[k] = pin.computeJointJacobians(model, kinematics)
+    def check(self) -> None:
+        """Raise what went wrong while coal measured."""
+        failure, self._shapes.failure = self._shapes.failure, None
+        if failure is not None:
+            raise failure
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now and how fast they move."""
         if (kept := _kept(obstacles)) != self._kept:
             expected, got = (", ".join(str(name) for name, *_ in things) for things in (self._kept, kept))
             raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
-        moved = self._shapes.update_scene(obstacles)
-        if not moved:
-            return
-        self._now = None
-        if self._last is not None:
-            for obstacle in moved:
-                self._last[1][:, self._shapes.rows[obstacle.name]] = -np.inf
-        self._take_speeds(obstacles)
+        if self._shapes.update_scene(obstacles):
+            self._take_kinds()
 
-    def _take_speeds(self, obstacles: tuple[Obstacle, ...]) -> None:
-        self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
-        self._speeds = np.zeros(self.size)
-        for obstacle in self._moving:
-            self._speeds[self._shapes.rows[obstacle.name]] = np.linalg.norm(obstacle.velocity)
-        self.kinds = np.where(self._speeds > 0.0, MOVING, STANDING)
+    def _take_kinds(self) -> None:
+        self.kinds[:] = np.where(self.memory.speed > 0.0, MOVING, STANDING)
         self.kinds[: len(self._robot.description.self_pairs)] = OWN
 
     def among(self, obstacles: tuple[Obstacle, ...]) -> "CollisionModel":

@@ -12,7 +12,7 @@ from handrail.controllers.robot.parts import PlacedShape
 from handrail.controllers.robot.shape import Shape
 
 
-class _Joint(NamedTuple):
+class Joint(NamedTuple):
     """A joint: its coordinate, axis, placement on its parent, and how far it slides; None if it turns."""
 
     index: int
@@ -30,7 +30,7 @@ def motion_bounds(model: RobotModel, placed: PlacedShape) -> FloatArray:
     axis. The shape lies in a ball; so does, seen from the joint's parent, all that a joint makes of a ball:
     one that turns leaves of its centre what lies along the axis, and reaches as far as it was aside.
     """
-    joints, bounds = _joints(model), np.zeros(model.size)
+    joints, bounds = joints_of(model), np.zeros(model.size)
     number, placement = model.mount(placed)
     centre, radius = placement.translation, _radius(placed.shape)
     while number > 0:
@@ -56,7 +56,7 @@ def _radius(shape: Shape) -> float:
 
 
 @lru_cache(maxsize=8)
-def _joints(model: RobotModel) -> tuple[_Joint, ...]:
+def joints_of(model: RobotModel) -> tuple[Joint, ...]:
     """Return the joints by their numbers; the first, which is the world, moves nothing."""
     pinocchio, limits = model.pinocchio, model.description.limits
     data, found = pinocchio.createData(), []
@@ -68,5 +68,5 @@ def _joints(model: RobotModel) -> tuple[_Joint, ...]:
         axis = data.oMi[number].rotation.T @ (columns[3:, index] if turns else columns[:3, index])
         travel = None if turns else float(farthest[index])
         parts = placement.translation.copy(), placement.rotation.copy()
-        found.append(_Joint(index, pinocchio.parents[number], axis, *parts, travel))
-    return (_Joint(-1, 0, np.zeros(3), np.zeros(3), np.eye(3), 0.0), *found)
+        found.append(Joint(index, pinocchio.parents[number], axis, *parts, travel))
+    return (Joint(-1, 0, np.zeros(3), np.zeros(3), np.eye(3), 0.0), *found)

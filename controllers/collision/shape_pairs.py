@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 from functools import lru_cache
+from typing import Any
 
 import coal
 import numpy as np
-import pinocchio as pin
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
-from handrail.controllers.collision.motion_bounds import motion_bounds
+from handrail.controllers.collision.motion_bounds import joints_of, motion_bounds
+from handrail.controllers.core.library import Memory, constant
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.parts import PlacedShape, Placement
@@ -17,6 +18,7 @@ from handrail.controllers.robot.shape import Obstacle, Shape
 
 FLOOR = "floor"
 _WORLD = "universe"  # pinocchio's name of it
+_KINDS = ("sphere", "capsule", "box", "cylinder", FLOOR)  # in the order of shapes.h
 
 
 class ShapePairs:
@@ -30,41 +32,46 @@ class ShapePairs:
         obstacles: what stands around, and what is held.
 
     Attributes:
-        geometry: all shapes and pairs, for coal.
         names: of the two shapes of each pair, (P,) of (str, str).
         work: which pairs are a tool shape against a work surface, (P,).
         largest_margin: the largest margin that a pair can keep [m], (P,).
         rows: those of the pairs with each obstacle, by its name.
         held: rows of the pairs with something that is held, (H,).
-        moves: which coordinates move the two shapes of a pair: 1 or 0, (P, 2, n).
-        motion_bounds: how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
+        memory: the compiled core's `Scene`.
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...]) -> None:
         self._model = model
-        self.geometry = pin.GeometryModel()
         description = model.description
-        placed = (*description.collision, *map(_placed, obstacles))
-        _check_names([thing.name for thing in placed])
-        self._index = {thing.name: self._add(thing) for thing in placed} | {FLOOR: self._add_floor()}
+        self._placed = [*description.collision, *map(_placed, obstacles)]
+        _check_names([thing.name for thing in self._placed])
+        self._index = {thing.name: index for index, thing in enumerate(self._placed)}
+        self._index[FLOOR] = len(self._placed)
         tools = {thing.name for thing in description.collision if thing.tool}
         surfaces = {obstacle.name for obstacle in obstacles if obstacle.work_surface}
         others = (*self._scene_pairs(obstacles), *self._held_pairs(obstacles, tools))
         self.names = (*description.self_pairs, *others)
-        for first, second in self.names:
-            self.geometry.addCollisionPair(pin.CollisionPair(self._index[first], self._index[second]))
         self.work: BoolArray = frozen([a in tools and b in surfaces for a, b in self.names], dtype=bool)
         margins = [description.self_margins, np.full(len(others), np.inf)]
         self.largest_margin: FloatArray = frozen(np.concatenate(margins))
-        self.moves = self._pair_moves()
-        self.motion_bounds = np.zeros((model.size, len(self.names)))
-        self._shape_bounds = dict(_all_motion_bounds(model))
         self.rows = {
             name: [row for row, pair in enumerate(self.names) if name in pair]
             for name in (obstacle.name for obstacle in obstacles)
         }
         held = (row for obstacle in obstacles if obstacle.held for row in self.rows[obstacle.name])
         self.held = np.array(list(held), dtype=int)
+        sizes = {"n": model.size, "S": len(self._index), "P": len(self.names)}
+        if model.size > (most := int(constant("MOST_COORDINATES"))):
+            raise HandrailError(
+                f"robot {description.name}: expected {most} coordinates at most, got {model.size}"
+            )
+        self.memory = Memory("Scene", sizes)
+        self._take_joints()
+        self._take_shapes()
+        self._take_pairs()
+        self.memory.call_back("measure", self._measure)
+        self.failure: BaseException | None = None
+        self._shape_bounds = dict(_all_motion_bounds(model))
         self._seen: dict[str, tuple[bytes, ...]] = {}
         self._bound_motions(range(len(self.names)))
         self.update_scene(obstacles)
@@ -85,14 +92,17 @@ class ShapePairs:
             if obstacle.held:
                 self._shape_bounds[obstacle.name] = motion_bounds(self._model, _placed(obstacle))
                 self._bound_motions(self.rows[obstacle.name])
+        self.memory.fields.changes += bool(moved)
         return moved
 
-    def place(self, obstacle: Obstacle, time: float = 0.0) -> None:
-        """Put an obstacle where it is after a time [s]."""
-        centre = obstacle.position + time * obstacle.velocity
-        frame = self._model.pinocchio.frames[self._model.frame_id(obstacle.frame or _WORLD)]
-        thing = self.geometry.geometryObjects[self._index[obstacle.name]]
-        thing.placement = frame.placement * pin.SE3(np.array(obstacle.rotation), centre)
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle where it is now."""
+        frame = self._model.pinocchio.frames[self._model.frame_id(obstacle.frame or _WORLD)].placement
+        index, memory = self._index[obstacle.name], self.memory
+        memory.shape_rotation[index] = (frame.rotation @ obstacle.rotation).ravel()
+        memory.shape_position[index] = frame.act(np.array(obstacle.position))
+        memory.velocity[index] = frame.rotation @ obstacle.velocity
+        memory.speed[self.rows[obstacle.name]] = np.linalg.norm(obstacle.velocity)
 
     def _scene_pairs(self, obstacles: tuple[Obstacle, ...]) -> list[tuple[str, str]]:
         """Return the robot with the floor and with what stands around."""
@@ -113,23 +123,49 @@ class ShapePairs:
             *((thing, other) for thing in held for other in around),
         ]
 
-    def _add(self, placed: PlacedShape) -> int:
-        thing = pin.GeometryObject(placed.name, *self._model.mount(placed), _coal_shape(placed.shape))
-        return self.geometry.addGeometryObject(thing)
+    def _take_joints(self) -> None:
+        memory = self.memory
+        for joint in joints_of(self._model)[1:]:
+            memory.parent[joint.index], memory.slides[joint.index] = joint.parent, joint.travel is not None
+            memory.joint_rotation[joint.index] = joint.rotation.ravel()
+            memory.joint_position[joint.index], memory.joint_axis[joint.index] = joint.translation, joint.axis
 
-    def _add_floor(self) -> int:
-        below = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-        return self.geometry.addGeometryObject(pin.GeometryObject(FLOOR, 0, pin.SE3.Identity(), below))
+    def _take_shapes(self) -> None:
+        memory = self.memory
+        for index, thing in enumerate(self._placed):
+            memory.carrier[index], placement = self._model.mount(thing)
+            memory.shape_rotation[index] = placement.rotation.ravel()
+            memory.shape_position[index] = placement.translation
+            memory.kind[index], memory.size[index] = _KINDS.index(thing.shape.kind), _size(thing.shape)
+        memory.kind[-1], memory.shape_rotation[-1] = _KINDS.index(FLOOR), np.eye(3).ravel()
 
-    def _pair_moves(self) -> FloatArray:
-        model = self._model.pinocchio
+    def _take_pairs(self) -> None:
+        model, memory = self._model.pinocchio, self.memory
         moved = np.zeros((model.njoints, model.nv))
         for joint in range(1, model.njoints):
             moved[joint] = moved[model.parents[joint]]
             moved[joint, model.joints[joint].idx_v] = 1.0
-        joints = [thing.parentJoint for thing in self.geometry.geometryObjects]
-        pairs = [(joints[pair.first], joints[pair.second]) for pair in self.geometry.collisionPairs]
-        return moved[np.array(pairs, dtype=int).reshape(-1, 2)]
+        for row, (first, second) in enumerate(self.names):
+            memory.first[row], memory.second[row] = self._index[first], self._index[second]
+        memory.moves[:] = moved[memory.carrier[memory.second]] - moved[memory.carrier[memory.first]]
+
+    def _measure(self, pair: int, placements: Any, witness: Any) -> int:
+        """Let coal measure two shapes whose cores meet; write normal and nearest points, (9,)."""
+        try:
+            given = np.ctypeslib.as_array(placements, (2, 12))
+            poses = [coal.Transform3s(each[:9].reshape(3, 3).copy(), each[9:].copy()) for each in given]
+            first, second = (_coal_shape(self._placed[index].shape) for index in self._pair(pair))
+            found = coal.DistanceResult()
+            coal.distance(first, poses[0], second, poses[1], coal.DistanceRequest(), found)
+            points = found.getNearestPoint1(), found.getNearestPoint2()
+            np.ctypeslib.as_array(witness, (9,))[:] = np.concatenate([found.normal, *points])
+        except BaseException as error:  # C cannot pass it on
+            self.failure = error
+            return 1
+        return 0
+
+    def _pair(self, row: int) -> tuple[int, int]:
+        return int(self.memory.first[row]), int(self.memory.second[row])
 
     def _bound_motions(self, rows: Iterable[int]) -> None:
         """Write the motion bounds of some pairs.
@@ -137,12 +173,10 @@ class ShapePairs:
         A coordinate that moves both shapes alike does not bring them together; of one that moves a single
         shape it is the shape's motion bound.
         """
-        none = np.zeros(self._model.size)
+        none, memory = np.zeros(self._model.size), self.memory
         for row in rows:
             first, second = (self._shape_bounds.get(name, none) for name in self.names[row])
-            self.motion_bounds[:, row] = (self.moves[row, 0] != self.moves[row, 1]) * np.maximum(
-                first, second
-            )
+            memory.bounds[:, row] = (memory.moves[row] != 0.0) * np.maximum(first, second)
 
 
 def _check_names(names: list[str]) -> None:
@@ -161,6 +195,14 @@ def _placed(obstacle: Obstacle) -> PlacedShape:
 def _coal_shape(shape: Shape) -> coal.ShapeBase:
     make = {"box": coal.Box, "capsule": coal.Capsule, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
     return make[shape.kind](*(float(length) for length in shape.size))
+
+
+def _size(shape: Shape) -> FloatArray:
+    """Return a shape's size as shapes.h has it, (3,)."""
+    if shape.kind == "box":
+        return 0.5 * shape.size
+    radius, *length = shape.size
+    return np.array([radius, 0.5 * length[0] if length else 0.0, 0.0])
 
 
 @lru_cache(maxsize=8)

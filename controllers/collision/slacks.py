@@ -4,7 +4,6 @@ One that all shared would let the robot come near itself for nothing, wherever a
 """
 
 OWN, STANDING, MOVING, LIMITS = range(4)
-"""Distances [m] to the robot itself, to what stands still or is held, to what moves; limits of the joints."""
+"""Distances [m] to the robot itself, to what stands still or is held, to movers; joint limits (core.h)."""
 
 SLACKS = 4
-VELOCITY_SLACK = 1e-3  # share of the limits' slack that velocity limits get: they can always be kept

@@ -6,7 +6,6 @@ from typing import Self
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.collision.distance_kernels import smallest
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.shape import Obstacle
@@ -83,7 +82,10 @@ class Surroundings:
 
     def smallest(self, distances: FloatArray) -> tuple[float, float]:
         """Return the smallest distance, tools at work surfaces left out, and the smallest of those [m]."""
-        return smallest(distances, self.collision.work)
+        work = self.collision.work
+        if not work.any():
+            return float(distances.min(initial=np.inf)), np.inf
+        return float(distances[~work].min(initial=np.inf)), float(distances[work].min(initial=np.inf))
 
 
 def _wanted(collision: CollisionModel, margin: float, work_margin: float) -> FloatArray:

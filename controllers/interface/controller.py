@@ -5,10 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, frozen, real
+from handrail.controllers.arrays import FloatArray, are_finite, frozen, real
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.numerics.jit import are_finite, bounded
 from handrail.controllers.robot.parts import Limits
 from handrail.controllers.robot.shape import Obstacle
 
@@ -57,7 +56,7 @@ class State:
         size = len(limits.velocity)
         for said in (self.commanded, self.v):
             if _known(said, size):
-                return bounded(said, limits.velocity)
+                return np.minimum(np.maximum(said, -limits.velocity), limits.velocity)
         return np.zeros(size)
 
 

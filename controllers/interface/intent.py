@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.controllers.arrays import BoolArray, FloatArray, frozen, real
+from handrail.controllers.arrays import BoolArray, FloatArray, are_finite, frozen, real
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
-from handrail.controllers.numerics.jit import are_finite
 
 DEAD_MAN_TIME = 0.25
 """Age from which an input or an intent is stale, and the robot brakes [s]."""

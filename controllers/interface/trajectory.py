@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.numerics.jit import exact_jit, jit
 
 _ROUNDING = 1e-5  # of a time, relative: no later than the last knot
 
@@ -78,28 +77,15 @@ class Trajectory:
         return whole, passed - whole * self.dt
 
 
-@jit
-def _interpolated(velocities, knots):
+def _interpolated(velocities: FloatArray, knots: FloatArray) -> FloatArray:
     """Return velocities at times in units of dt, (K,), the last one held after the end, (K, n)."""
-    last, n = len(velocities) - 1, velocities.shape[1]
-    result = np.empty((len(knots), n))
-    for k in range(len(knots)):
-        knot = min(knots[k], float(last))
-        index = min(int(knot), last - 1)
-        weight = knot - index
-        for j in range(n):
-            result[k, j] = (1.0 - weight) * velocities[index, j] + weight * velocities[index + 1, j]
-    return result
+    last = len(velocities) - 1
+    knots = np.minimum(knots, float(last))
+    index = np.minimum(knots.astype(np.intp), last - 1)
+    weight = (knots - index)[:, None]
+    return (1.0 - weight) * velocities[index] + weight * velocities[index + 1]
 
 
-@exact_jit
-def _accelerations(velocities, dt, elapsed, count):
-    knots = np.empty(count + 1)
-    for k in range(count + 1):
-        knots[k] = (dt * k + elapsed) / dt
-    found = _interpolated(velocities, knots)
-    result = np.empty((count, velocities.shape[1]))
-    for k in range(count):
-        for j in range(velocities.shape[1]):
-            result[k, j] = (found[k + 1, j] - found[k, j]) / dt
-    return result
+def _accelerations(velocities: FloatArray, dt: float, elapsed: float, count: int) -> FloatArray:
+    found = _interpolated(velocities, (dt * np.arange(count + 1) + elapsed) / dt)
+    return (found[1:] - found[:-1]) / dt

@@ -10,7 +10,6 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.loop_state import LoopState
-from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.regularisation import (
     acceleration_regularisation,
@@ -58,9 +57,11 @@ class ProblemBuilder:
             raise HandrailError(f"prediction: expected values of shape {expected}, got {predicted.shape}")
         reference = _asked(self._reference, predicted, intent.mask, self._largest)
         parameters[self._residuals.parameter_slice("tracking")] = intent.frames.parameters
+        sent = state.sent(self._limits)
         return Problem(
             q=state.expected,
-            v=resumed(state.sent(self._limits), state.v, self._tolerance),
+            v=resumed(sent, state.v, self._tolerance),
+            sent=sent,
             dt=settings.dt,
             reference=reference,
             weights=self._weights_of(intent.mask.tobytes()),
@@ -110,7 +111,6 @@ def _per_length(weights: FloatArray, lengths: BoolArray, settings: MpcSettings) 
     return np.where(lengths, weights / settings.length**2, weights)
 
 
-@exact_jit
 def resumed(commanded: FloatArray, measured: FloatArray, tolerance: FloatArray) -> FloatArray:
     """Return the velocity from which a command goes on, (n,).
 
@@ -123,28 +123,16 @@ def resumed(commanded: FloatArray, measured: FloatArray, tolerance: FloatArray) 
         measured: v, (n,).
         tolerance: how far they may differ, (n,).
     """
-    result = np.empty(len(commanded))
-    for j in range(len(commanded)):
-        close = min(max(commanded[j], measured[j] - tolerance[j]), measured[j] + tolerance[j])
-        result[j] = min(max(close, min(commanded[j], 0.0)), max(commanded[j], 0.0))
-    return result
+    close = np.minimum(np.maximum(commanded, measured - tolerance), measured + tolerance)
+    return np.minimum(np.maximum(close, np.minimum(commanded, 0.0)), np.maximum(commanded, 0.0))
 
 
-@exact_jit
-def _asked(reference, predicted, mask, largest):
+def _asked(reference: FloatArray, predicted: FloatArray, mask: BoolArray, largest: FloatArray) -> FloatArray:
     """Return a reference whose first columns are the predicted values within ± largest, 0 where masked out.
 
-    What is no number stays none: whoever solves for it fails, and the robot brakes.
+    NaN stays NaN: the solver then fails, and the robot brakes.
     """
     result = reference.copy()
-    for k in range(len(predicted)):
-        for channel in range(len(mask)):
-            value = predicted[k, channel]
-            if not mask[channel]:
-                value = 0.0
-            elif value > largest[channel]:
-                value = largest[channel]
-            elif value < -largest[channel]:
-                value = -largest[channel]
-            result[k, channel] = value
+    bounded = np.minimum(np.maximum(predicted, -largest), largest)
+    result[:, : len(mask)] = np.where(mask, bounded, 0.0)
     return result

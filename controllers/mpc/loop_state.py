@@ -15,7 +15,7 @@ from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.interface.validation import InputHistory
 from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.robot.shape import Obstacle
-from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
+from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
 
 
 class LoopState(NamedTuple):

@@ -2,7 +2,7 @@
 
 from time import perf_counter
 
-from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.arrays import FloatArray, IntArray, are_finite
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
@@ -22,8 +22,7 @@ from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
-from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
-from handrail.controllers.solvers.real_time import RealTimeSolver
+from handrail.controllers.solvers.real_time import NOTHING_ACTIVE, RealTimeSolver
 
 _SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
 
@@ -114,9 +113,8 @@ class MaskedMpc:
         """
         guess = loop.guess(state.time, self.settings.horizon, self.model.size)
         try:
-            plan = self.solver.solve(problem, guess, loop.active).within(problem)
+            plan = self.solver.solve(problem, guess, loop.active)
         except _SOLVER_ERRORS:
             return None, NOTHING_ACTIVE
-        if not plan.is_solution(problem):
-            return None, plan.active
-        return plan.taken_up(problem, state.sent(problem.limits)), plan.active
+        valid = plan.solved and are_finite(plan.v.ravel()) and are_finite(plan.q.ravel())
+        return plan if valid else None, plan.active

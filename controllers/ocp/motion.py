@@ -1,61 +1,35 @@
-"""Arithmetic of motions under accelerations held over stages, in machine code."""
+"""Motions under accelerations held over stages, and the configurations at which distances are kept."""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from handrail.controllers.numerics.jit import exact_jit, jit
+from handrail.controllers.arrays import FloatArray
+
+STOPS = (0.375, 0.5)  # of v_N |v_N| / a_max: half way in time of the stop from the last node, and at rest
 
 
-@jit
-def rollout(q, v, dt, u, positions, velocities):
-    """Write positions and velocities, (N + 1, n), from (q, v) under accelerations u, (N, n)."""
-    horizon, n = u.shape
-    for j in range(n):
-        positions[0, j] = q[j]
-        velocities[0, j] = v[j]
-    for k in range(horizon):
-        for j in range(n):
-            after = velocities[k, j] + dt * u[k, j]
-            velocities[k + 1, j] = after
-            positions[k + 1, j] = positions[k, j] + 0.5 * dt * (velocities[k, j] + after)
+def rollout(q: FloatArray, v: FloatArray, dt: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return positions and velocities, (N + 1, n), from (q, v), (n,), under accelerations u, (N, n).
+
+    `v_k = v_{k-1} + dt u_k`, `q_k = q_{k-1} + dt/2 (v_{k-1} + v_k)`.
+    """
+    velocities = np.cumsum(np.vstack([v, dt * u]), axis=0)
+    ways = 0.5 * dt * (velocities[:-1] + velocities[1:])
+    return np.cumsum(np.vstack([q, ways]), axis=0), velocities
 
 
-@exact_jit
-def within(values, limit):
-    """Whether all values, (K, n), are within ± limit, (n,); those that are no numbers are not."""
-    inside = True
-    for k in range(len(values)):
-        for j in range(values.shape[1]):
-            inside &= abs(values[k, j]) <= limit[j]
-    return inside
+class Nodes(NamedTuple):
+    """Now, after every stage, and along the final stop."""
+
+    q: FloatArray  # (N + 3, n)
+    times: FloatArray  # from now on, (N + 3,) [s]
+    gains: FloatArray  # derivative of the stop's two configurations by v_N, (2, n) [s]
 
 
-@exact_jit
-def approach(velocities, step):
-    """Keep velocities, (K, n), within ± a step, (n,), of those before; the first stays."""
-    for k in range(1, len(velocities)):
-        for j in range(velocities.shape[1]):
-            before = velocities[k - 1, j]
-            velocities[k, j] = min(max(velocities[k, j], before - step[j]), before + step[j])
-
-
-@jit
-def cumulated(velocities, dt):
-    """Return how far velocities at knots, (K, n), have led at each of them, (K, n)."""
-    way = np.zeros(velocities.shape)
-    for k in range(1, len(velocities)):
-        for j in range(velocities.shape[1]):
-            way[k, j] = way[k - 1, j] + 0.5 * dt * (velocities[k - 1, j] + velocities[k, j])
-    return way
-
-
-@jit
-def changed(q, v, dt, u, change, limit):
-    """Return positions and velocities, (N + 1, n), under changed accelerations, and these, within ± limit."""
-    horizon, n = u.shape
-    positions, velocities = np.empty((horizon + 1, n)), np.empty((horizon + 1, n))
-    within = np.empty((horizon, n))
-    for k in range(horizon):
-        for j in range(n):
-            within[k, j] = min(max(u[k, j] + change[k, j], -limit[j]), limit[j])
-    rollout(q, v, dt, within, positions, velocities)
-    return positions, velocities, within
+def nodes_of(q: FloatArray, v: FloatArray, acceleration: FloatArray, dt: float) -> Nodes:
+    """Return the nodes of a motion: positions and velocities (N + 1, n), limits of acceleration, (n,)."""
+    stop, shares = np.abs(v[-1]) / acceleration, np.array(STOPS)[:, None]
+    times = dt * np.arange(len(q))
+    after = times[-1] + stop.max(initial=0.0) * np.array([0.5, 1.0])
+    return Nodes(np.vstack([q, q[-1] + shares * stop * v[-1]]), np.append(times, after), 2.0 * shares * stop)

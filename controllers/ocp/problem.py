@@ -1,12 +1,12 @@
 """The masked optimal control problem of one update (the paper's equation 6), as a value."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.ocp.motion import approach, cumulated, rollout, within
+from handrail.controllers.ocp.motion import rollout
 from handrail.controllers.robot.parts import Limits
 
 
@@ -22,6 +22,7 @@ class Problem:
     Attributes:
         q: position now, (n,).
         v: velocity now, (n,).
+        sent: velocity that is being sent, with which the plan begins, (n,).
         dt: length of a stage [s].
         reference: of every residual row, (N, r).
         weights: of every residual row, (N, r).
@@ -36,6 +37,7 @@ class Problem:
 
     q: FloatArray
     v: FloatArray
+    sent: FloatArray
     dt: float
     reference: FloatArray
     weights: FloatArray
@@ -59,10 +61,7 @@ class Problem:
 
     def rollout(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities at the N + 1 nodes under accelerations u, (N, n)."""
-        shape = (len(u) + 1, len(self.v))
-        q, v = np.empty(shape), np.empty(shape)
-        rollout(self.q, self.v, self.dt, u, q, v)
-        return q, v
+        return rollout(self.q, self.v, self.dt, u)
 
 
 @dataclass(frozen=True)
@@ -101,36 +100,10 @@ class Plan:
         for name in ("q", "v", "u", "distances"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
-    def within(self, problem: Problem) -> "Plan":
-        """Return the plan with velocities cut to their limits; accelerations and positions follow.
-
-        Cutting is monotone, so that no acceleration becomes larger.
-        """
-        limit = problem.limits.velocity
-        if within(self.v[1:], limit):
-            return self
-        v = np.vstack([self.v[0], np.minimum(np.maximum(self.v[1:], -limit), limit)])
-        u = np.diff(v, axis=0) / problem.dt
-        q, v = problem.rollout(u)
-        return replace(self, q=q, v=v, u=u)
-
-    def taken_up(self, problem: Problem, velocity: FloatArray) -> "Plan":
-        """Return the plan as taken up by a robot that is being sent another velocity than its first, (n,).
-
-        `v_0 = velocity`, `v_k ← clip(v_k, v_{k-1} ± dt a_max)`: so consecutive commands keep the limit too.
-        """
-        if np.array_equal(velocity, self.v[0]):
-            return self
-        v = np.vstack([velocity, self.v[1:]])
-        approach(v, problem.dt * problem.limits.acceleration)
-        u = np.diff(v, axis=0) / problem.dt
-        return replace(self, q=problem.q + cumulated(v, problem.dt), v=v, u=u)
-
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
         bound = problem.limits.acceleration * (1.0 + tolerance) + tolerance
-        if not (self.solved and within(self.u, bound)):
+        if not (self.solved and np.all(np.abs(self.u) <= bound)):
             return False
         q, v = problem.rollout(self.u)
-        error = np.full(len(problem.v), tolerance)
-        return within(self.q - q, error) and within(self.v - v, error)
+        return bool(np.all(np.abs(self.q - q) <= tolerance) and np.all(np.abs(self.v - v) <= tolerance))

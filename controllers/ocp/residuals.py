@@ -37,6 +37,8 @@ class StageResiduals:
         affine: the rows with a constant Jacobian.
         curved: where the other rows lie, (c,).
         expression: the residual of one stage as a CasADi function of (z, p).
+        arrays: `z` of all stages, (N, 3n); `values`, (N, c), and `jacobians`, (N, 3n, c), of the curved rows.
+        evaluate: writes values and Jacobians at z; evaluate_values: the values alone.
     """
 
     def __init__(self, model: RobotModel, objectives: tuple[Objective, ...], horizon: int) -> None:
@@ -73,52 +75,30 @@ class StageResiduals:
         """Return the weight of every row under a mask, (r,)."""
         return np.concatenate([objective.weights(mask) for objective in self.objectives])
 
-    def evaluate(
-        self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return z (N, 3n), and the curved rows' residuals (N, c) and Jacobians by z, (N, 3n, c); views.
-
-        Args:
-            q: positions after the stages, (N, n).
-            v: velocities after them, (N, n).
-            u: accelerations during them, (N, n).
-            parameters: of all objectives, (k,).
-        """
-        self._take(q, v, u, parameters)
-        self._evaluate_all()
-        return self._z, self._values, self._jacobians
-
-    def values(
-        self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return z (N, 3n) and the curved rows' residuals (N, c), as views; arguments as for `evaluate`."""
-        self._take(q, v, u, parameters)
-        self._evaluate_values()
-        return self._z, self._values
-
-    def _take(self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray) -> None:
-        for part, given in zip(self._parts, (q, v, u), strict=True):
-            part[:] = given
+    def set_parameters(self, parameters: FloatArray) -> None:
+        """Take the parameters of all objectives, (k,), for `evaluate` and `evaluate_values`."""
         self._p[:] = parameters
 
     def _compile(self, residual: ca.SX, z: ca.SX, p: ca.SX, horizon: int, n: int) -> None:
         curved = ca.densify(residual[self.curved.tolist()])
-        self._z = np.zeros((horizon, 3 * n))
-        self._parts = self._z[:, :n], self._z[:, n : 2 * n], self._z[:, 2 * n :]
         self._p = np.zeros((horizon, p.shape[0]))
-        self._values = np.zeros((horizon, len(self.curved)))
-        self._jacobians = np.zeros((horizon, 3 * n, len(self.curved)))  # column-major in CasADi
+        self.arrays = {
+            "z": np.zeros((horizon, 3 * n)),
+            "values": np.zeros((horizon, len(self.curved))),
+            "jacobians": np.zeros((horizon, 3 * n, len(self.curved))),  # column-major in CasADi
+        }
         jacobian = ca.densify(ca.jacobian(curved, z))
-        self._evaluate_values = self._bound("values", [z, p], [curved])
-        self._evaluate_all = self._bound("stage", [z, p], [curved, jacobian])
+        self.evaluate_values = self._bound("values", [z, p], [curved])
+        self.evaluate = self._bound("stage", [z, p], [curved, jacobian])
 
     def _bound(self, name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> Callable[[], None]:
         """Return a function of all stages, compiled, that reads and writes this object's arrays."""
-        function = compiled(ca.Function(name, inputs, outputs)).map(len(self._z))
+        function = compiled(ca.Function(name, inputs, outputs)).map(len(self._p))
         buffer, evaluate = function.buffer()
-        buffer.set_arg(0, memoryview(self._z))
+        z, *results = self.arrays.values()
+        buffer.set_arg(0, memoryview(z))
         buffer.set_arg(1, memoryview(self._p))
-        for index, result in enumerate((self._values, self._jacobians)[: len(outputs)]):
+        for index, result in enumerate(results[: len(outputs)]):
             buffer.set_res(index, memoryview(result))
         self._buffers[name] = buffer
         return evaluate

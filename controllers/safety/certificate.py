@@ -6,15 +6,10 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.collision.slacks import MOVING
-from handrail.controllers.numerics.jit import jit
+from handrail.controllers.core.library import functions
 from handrail.controllers.safety.limiter import Limiter
 
-_SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
-_ERROR = 1e-3  # of signed distances, that is no loss [m]
-_HARD_ERROR = 1e-4  # the same where a thing that stands still is nearer than its hard limit [m]
-_HARD = 0.5  # hard limit of the robot with itself and with what stands still, as a share of the least
-_BEYOND = 0.01  # of its range that a joint may come to rest [m, rad]
+_WAITING = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a robot waits after it has stopped
 
 
 class Violation(NamedTuple):
@@ -63,8 +58,13 @@ class StopCertificate(NamedTuple):
             now: the position now, (n,), and its distances, (P,).
             delay: time until it begins [s].
         """
-        path, times = self.limiter.stop(q, v, _SAMPLES)
-        return self.until_rest(path, delay + times, now)
+        found, limits = np.empty(2), self.limiter.limits
+        bounds = limits.position_lower, limits.position_upper, limits.acceleration
+        functions().stop_violation(
+            self.collision.memory, q, v, delay, self.span, self.lag, *now, self.least, *bounds, found
+        )
+        self.collision.check()
+        return Violation(*found.tolist())
 
     def until_rest(
         self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]
@@ -75,33 +75,18 @@ class StopCertificate(NamedTuple):
         """
         left = self.span - times[-1]
         if self.collision.any_moving and left > 0.0:
-            path = np.vstack([path, np.broadcast_to(path[-1], (len(_SAMPLES), path.shape[1]))])
-            times = np.append(times, times[-1] + left * _SAMPLES)
+            path = np.vstack([path, np.broadcast_to(path[-1], (len(_WAITING), path.shape[1]))])
+            times = np.append(times, times[-1] + left * _WAITING)
         return Violation(*self.along(path, times, now).max(axis=0).tolist())
 
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the same at every point of a motion, hard and of all, (K, 2)."""
         if self.lag is not None:
             path, times = np.vstack([path, path + self.lag]), np.tile(times, 2)
-        distances = self.collision.values(path, times, now, self.least)
-        bounds = self.limiter.limits.position_lower, self.limiter.limits.position_upper
-        found = _violations(path, distances, *now, self.least, self.collision.kinds, *bounds)
+        found, limits = np.empty((len(path), 2)), self.limiter.limits
+        path, bounds = np.ascontiguousarray(path), (limits.position_lower, limits.position_upper)
+        functions().path_violations(
+            self.collision.memory, len(path), path, times, *now, self.least, *bounds, found
+        )
+        self.collision.check()
         return found if self.lag is None else np.maximum(*np.split(found, 2))
-
-
-@jit
-def _violations(path, distances, start, now, least, kinds, lower, upper):
-    short = np.zeros((len(path), 2))
-    for k in range(len(path)):
-        for p in range(len(least)):
-            distance = distances[k, p]
-            short[k, 1] = max(short[k, 1], min(least[p], now[p] - _ERROR) - distance)
-            if kinds[p] != MOVING:
-                short[k, 0] = max(short[k, 0], min(_HARD * least[p], now[p] - _HARD_ERROR) - distance)
-        for j in range(len(start)):
-            room = min(path[k, j] - lower[j], upper[j] - path[k, j]) + _BEYOND
-            if room < 0.0:
-                before = min(0.0, start[j] - lower[j], upper[j] - start[j])
-                short[k, 0] = max(short[k, 0], before - room)
-        short[k, 1] = max(short[k, 0], short[k, 1])
-    return short

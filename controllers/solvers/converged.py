@@ -14,15 +14,15 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.collision.slacks import LIMITS, SLACKS, VELOCITY_SLACK
+from handrail.controllers.collision.slacks import LIMITS, SLACKS
+from handrail.controllers.core.library import constant
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interrupts import interrupted
-from handrail.controllers.ocp.nodes import Nodes
+from handrail.controllers.ocp.motion import Nodes, nodes_of
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
-from handrail.controllers.solvers.basis import stage_matrix
-from handrail.controllers.solvers.constraints import RECOVERY, constraints_around, write_row
 
+RECOVERY, VELOCITY_SLACK = constant("RECOVERY"), constant("VELOCITY_SLACK")
 _ROUNDS = 50  # of linearising the distances, at most
 _TOLERANCE = 1e-5  # promised improvement of the cost, relative, at which it stops
 _NOISE = 1e-9  # of the cost: what the inner solver leaves
@@ -145,7 +145,7 @@ class ConvergedSolver:
         z, parameters = np.hstack([q[1:], v[1:], u]), np.tile(problem.parameters, (problem.horizon, 1))
         error = np.array(self._residuals(z.T, parameters.T)).T - problem.reference
         tracking = 0.5 * float(np.sum(problem.weights * error**2))
-        nodes = Nodes(problem, q, v)
+        nodes = _nodes(problem, q, v)
         left, kinds = _distances_left(problem, nodes), problem.collision.kinds
         distances = [np.max(-left[1:, kinds == kind], initial=0.0) for kind in range(LIMITS)]
         slack = np.append(distances, _limit_slack(problem, q, v))
@@ -155,15 +155,29 @@ class ConvergedSolver:
     def _iterate(self, problem: Problem, u: FloatArray) -> _Iterate:
         u = np.clip(u, -problem.limits.acceleration, problem.limits.acceleration)
         q, v = problem.rollout(u)
-        nodes = Nodes(problem, q, v)
+        nodes = _nodes(problem, q, v)
         found = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
-        rows = constraints_around(problem, (q, v, u), nodes, found, self._matrix)
-        matrix = np.zeros((_BLOCK * -(-len(rows.row) // _BLOCK), u.size + SLACKS))
+        node, pair = near = found.near[found.near[:, 0] > 0].T
+        matrix = np.zeros((_BLOCK * -(-len(node) // _BLOCK), u.size + SLACKS))
         left = np.ones(len(matrix))
-        for index, row in enumerate(rows.row):
-            left[index], _ = write_row(rows, row, matrix[index])
-        near = found.near[found.near[:, 0] > 0]
-        return _Iterate(u, self.evaluate(problem, u), matrix, left, near)
+        left[: len(node)] = _distances_left(problem, nodes, found.values)[node, pair]
+        gradients = found.gradients[found.near[:, 0] > 0]
+        self._write_rows(problem, nodes, near, gradients, matrix)
+        return _Iterate(u, self.evaluate(problem, u), matrix, left, near.T)
+
+    def _write_rows(
+        self, problem: Problem, nodes: Nodes, near: IntArray, gradients: FloatArray, matrix: FloatArray
+    ) -> None:
+        """Write `-d'` of the near pairs at their nodes, by changes s, and -1 for the slack of their kind."""
+        horizon, n = problem.horizon, len(problem.q)
+        for row, ((node, pair), gradient) in enumerate(zip(near.T, gradients, strict=True)):
+            stage, stop = min(node, horizon) - 1, node - horizon - 1
+            by_velocity = nodes.gains[stop] * gradient if stop >= 0 else np.zeros(n)
+            parts = self._matrix[0][:, None] * gradient + self._matrix[1][:, None] * by_velocity  # (3, n)
+            for share, before in zip(parts, range(stage - 2, stage + 1), strict=True):
+                if before >= 0:
+                    matrix[row, before * n : (before + 1) * n] = -share
+            matrix[row, horizon * n + problem.collision.kinds[pair]] = -1.0
 
     def _step(self, problem: Problem, here: _Iterate, trust: FloatArray) -> tuple[_Solution, _Iterate, int]:
         """Return the program's solution, the best iterate found with it, and iterations.
@@ -180,7 +194,7 @@ class ConvergedSolver:
                 break
             node, pair = here.near.T
             left, change = here.left.copy(), here.matrix[:, :-SLACKS] @ solution.change
-            exact = _distances_left(problem, Nodes(problem, *problem.rollout(after.u)))
+            exact = _distances_left(problem, _nodes(problem, *problem.rollout(after.u)))
             left[: len(node)] = exact[node, pair] + change[: len(node)]
             solution = self._solved(problem, here, left, trust)
             after = self._iterate(problem, solution.u)
@@ -225,7 +239,7 @@ class ConvergedSolver:
 
 
 def _program(residuals: Any, shape: tuple[int, int], matrix: FloatArray, rows: int) -> ca.Function:
-    """Return the program in changes s of local support (basis.py) and the slacks σ.
+    """Return the program in changes s of local support (core/motion.c) and the slacks σ.
 
     Its constraints: positions and velocities less their slack, and with it; accelerations; distances.
     """
@@ -252,12 +266,23 @@ def _program(residuals: Any, shape: tuple[int, int], matrix: FloatArray, rows: i
     return ca.nlpsol("program", "ipopt", program, _OPTIONS)
 
 
-def _distances_left(problem: Problem, nodes: Nodes) -> FloatArray:
+def stage_matrix(dt: float) -> FloatArray:
+    """Return how (q, v, u) of a stage depend on (s_{k-2}, s_{k-1}, s_k) of core/motion.c, (3, 3)."""
+    half = 0.5 * dt * dt
+    return np.array([[0.0, half, half], [0.0, -dt, dt], [1.0, -2.0, 1.0]])
+
+
+def _nodes(problem: Problem, q: FloatArray, v: FloatArray) -> Nodes:
+    return nodes_of(q, v, problem.limits.acceleration, problem.dt)
+
+
+def _distances_left(problem: Problem, nodes: Nodes, values: FloatArray | None = None) -> FloatArray:
     """Return by how much every pair is farther away than it must be at the nodes from now on, (K, P) [m].
 
     It must be `margin - max(margin - d_now, 0) 0.8ᵏ` away: a pair inside its margin recovers gradually.
     """
-    values = problem.collision.values(nodes.q, nodes.times)
+    if values is None:
+        values = problem.collision.values(nodes.q, nodes.times)
     deficit = np.maximum(problem.margins - values[0], 0.0)
     return values - problem.margins + deficit * RECOVERY ** np.arange(len(values))[:, None]
 

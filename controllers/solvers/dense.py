@@ -6,27 +6,18 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.slacks import SLACKS
-from handrail.controllers.solvers.active_set import QuadraticProgram
-from handrail.controllers.solvers.constraints import write_row
+from handrail.controllers.core.library import Memory, functions
 
 
 @dataclass(frozen=True)
 class DenseProgram:
-    """`min ½ xᵀ H x + gᵀ x` subject to `A x ≤ b`, x = (s, σ).
+    """`min ½ xᵀ H x + gᵀ x` subject to `A x ≤ b`, x = (s, σ)."""
 
-    Attributes:
-        hessian: H, (m, m).
-        gradient: g, (m,).
-        matrix: A, (r, m).
-        upper: b, (r,).
-        rows: numbers of the rows, (r,).
-    """
-
-    hessian: FloatArray
-    gradient: FloatArray
-    matrix: FloatArray
-    upper: FloatArray
-    rows: IntArray
+    hessian: FloatArray  # H, (m, m)
+    gradient: FloatArray  # g, (m,)
+    matrix: FloatArray  # A, (r, m)
+    upper: FloatArray  # b, (r,)
+    rows: IntArray  # their numbers, (r,)
 
     def value(self, x: FloatArray) -> float:
         """Return the objective, (m,)."""
@@ -37,16 +28,18 @@ class DenseProgram:
         return float(np.max(self.matrix @ x - self.upper))
 
 
-def dense(program: QuadraticProgram) -> DenseProgram:
-    """Return a QP, whose H is not yet factored, as dense matrices."""
-    band, gradient, (linear, quadratic), constraints = program
-    size = len(gradient)
-    hessian = np.diag(np.full(size + SLACKS, quadratic))
+def dense(core: Memory, scene: Memory) -> DenseProgram:
+    """Return the QP that stands in the core, its H not yet factored, as dense matrices."""
+    size = core.fields.M
+    hessian = np.diag(np.full(size + SLACKS, core.fields.quadratic))
     for j in range(size):
-        column = band[j, : size - j]
+        column = core.band[j, : size - j]
         hessian[j, j : j + len(column)] = hessian[j : j + len(column), j] = column
-    rows = np.append(np.arange(constraints.first), constraints.row)
+    first = SLACKS + 6 * size
+    rows = np.append(np.arange(first), core.number[: core.fields.count])
     matrix, upper = np.empty((len(rows), size + SLACKS)), np.empty(len(rows))
-    for index, row in enumerate(rows):
-        upper[index], _ = write_row(constraints, row, matrix[index])
-    return DenseProgram(hessian, np.append(gradient, np.full(SLACKS, linear)), matrix, upper, rows)
+    for place in range(len(rows)):
+        upper[place] = functions().write_row(core, scene, place, matrix[place], np.zeros(1, dtype=np.int64))
+    return DenseProgram(
+        hessian, np.append(core.slope, np.full(SLACKS, core.fields.linear)), matrix, upper, rows
+    )

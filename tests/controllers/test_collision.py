@@ -1,12 +1,9 @@
-"""Distances' laws: gradients against finite differences, bulk reading against one by one."""
+"""Distances' laws: those of coal, gradients against finite differences, bounds."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.collision.pair_data import PairData
-from handrail.controllers.collision.shape_pairs import ShapePairs
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -41,16 +38,6 @@ def test_gradients_are_the_derivatives_of_the_distances():
     assert checked > 500
 
 
-def test_bulk_reading_is_reading_one_by_one():
-    model, geometry = MODEL.pinocchio, ShapePairs(MODEL, scene(np.random.default_rng(1))).geometry
-    data = model.createData()
-    reader = PairData(model, data, geometry, pin.neutral(model))
-    assert reader.view is not None, "coal lays its results out differently: updates will be slow"
-    for q in np.random.default_rng(2).uniform(-2, 2, (10, MODEL.size)):
-        pin.computeDistances(model, data, geometry, reader.geometry, q)
-        np.testing.assert_array_equal(reader.read(), reader.one_by_one())
-
-
 def test_what_is_skipped_is_far():
     """Values that are not measured are lower bounds, and never of a pair within reach."""
     rng = np.random.default_rng(4)
@@ -70,25 +57,6 @@ def test_what_is_skipped_is_far():
         cheap, near = collision.values(path, None, (path[0], exact[0]), reach), exact < reach
         assert np.all(cheap <= exact + 1e-5)
         np.testing.assert_allclose(cheap[near], exact[near], atol=1e-5)
-
-
-def test_what_is_skipped_is_far_after_a_similar_trajectory():
-    """The memory of the last trajectory spares measurements, and changes nothing of what is near."""
-    rng = np.random.default_rng(5)
-    obstacles = scene(rng)
-    collision = CollisionModel(MODEL, obstacles)
-    skipped = 0
-    path = MODEL.description.home + np.cumsum(rng.uniform(-0.2, 0.2, (12, MODEL.size)), axis=0)
-    for _ in range(30):
-        path = path + rng.uniform(-0.01, 0.02, (12, MODEL.size))
-        exact, fresh = collision.values(path), CollisionModel(MODEL, obstacles).distances(path, within=0.3)
-        distances = collision.distances(path, within=0.3)
-        assert np.all(distances.values <= exact + 1e-5)
-        np.testing.assert_array_equal(distances.near, fresh.near)
-        np.testing.assert_allclose(distances.gradients, fresh.gradients, atol=1e-6)
-        spared = [np.count_nonzero(each.values < exact - 1e-3) for each in (distances, fresh)]
-        skipped += spared[0] - spared[1]
-    assert skipped > 0
 
 
 def test_what_was_far_of_an_obstacle_is_forgotten_when_it_has_moved():

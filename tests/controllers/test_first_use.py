@@ -1,6 +1,5 @@
 """Who asked is told, once, that something is being compiled; what is in the cache is not compiled."""
 
-import runpy
 import subprocess
 import sys
 
@@ -10,14 +9,6 @@ import pytest
 from handrail.controllers.numerics import first_use
 from handrail.controllers.numerics.compiled import compiled
 
-SOURCE = """
-from handrail.controllers.numerics.jit import jit
-
-@jit
-def doubled(number):
-    return 2 * number
-"""
-
 
 @pytest.fixture
 def told():
@@ -26,19 +17,6 @@ def told():
     first_use.tell_when_compiling(lambda: said.append("compiling"))
     yield said
     first_use.tell_when_compiling(lambda: None)
-
-
-def test_numba_s_first_call_is_told_and_what_is_in_the_cache_is_not(told, tmp_path):
-    file = tmp_path / "doubling.py"
-    file.write_text(SOURCE)
-    doubled = runpy.run_path(str(file))["doubled"]
-    assert told == []
-    assert doubled(3) == 6
-    assert doubled(3.0) == 6.0  # another type is compiled too, but it has been said
-    assert told == ["compiling"]
-    first_use.tell_when_compiling(lambda: told.append("again"))
-    assert runpy.run_path(str(file))["doubled"](4) == 8
-    assert told == ["compiling"]
 
 
 def test_a_library_of_casadi_is_told_and_one_in_the_cache_is_not(told, tmp_path, monkeypatch):

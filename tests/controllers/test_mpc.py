@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, REST, asking, realised, roll
 
-from handrail.controllers.collision.slacks import SLACKS
+from handrail.controllers.core.library import functions
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
@@ -18,8 +18,6 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.controllers.solvers.active_set import Answer
-from handrail.controllers.solvers.basis import to_motion
 
 MPC = MaskedMpc(MODEL)
 POST = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.5, 0.6])
@@ -100,8 +98,8 @@ def test_a_failed_solve_brakes(monkeypatch):
     asked = asking(np.full(18, 0.3), "ee")
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
-    infeasible = Answer(False, np.zeros(SLACKS), 0.0, 3, np.arange(SLACKS))
-    monkeypatch.setattr(MPC.solver.qp, "solve", lambda *_: infeasible)
+    solve = MPC.solver.solve
+    monkeypatch.setattr(MPC.solver, "solve", lambda *given: replace(solve(*given), solved=False))
     beyond = asking(np.full(18, -2.0), "ee")
     command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
     assert command.diagnostics.status is Status.SOLVER_FAILED
@@ -181,12 +179,13 @@ def test_the_quadratic_is_that_of_the_cost():
         return np.sqrt(problem.weights) * (r - problem.reference)
 
     q, v = problem.rollout(u)
-    cost = MPC.solver.cost
-    value, gradient, hessian = cost.expand(problem, q, v, u)
+    core = MPC.solver.program(problem, u)
+    value = functions().build_program(core, problem.collision.memory)
+    gradient, hessian = core.slope.copy(), core.band.copy()
     h, jacobian = 1e-6, []
     motion = np.zeros((10, 3, 9))
     for index in range(90):
-        to_motion(cost.matrix, h * np.eye(90)[index], motion)  # a variable's accelerations
+        functions().to_motion(core, h * np.eye(90)[index], motion)  # a variable's accelerations
         step = motion[:, 2]
         jacobian.append(((residuals(u + step) - residuals(u - step)) / (2 * h)).ravel())
     jacobian = np.array(jacobian).T
@@ -197,7 +196,7 @@ def test_the_quadratic_is_that_of_the_cost():
     found = [hessian[j, i - j] for i, j in inside]
     band = [expected[i, j] for i, j in inside]
     np.testing.assert_allclose(value, 0.5 * np.sum(residuals(u) ** 2), rtol=1e-9)
-    np.testing.assert_allclose(cost.value(problem, q, v, u), value, rtol=1e-12)
+    np.testing.assert_allclose(functions().cost_of(core, q, v, u), value, rtol=1e-12)
     np.testing.assert_allclose(gradient, jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
     np.testing.assert_allclose(found, band, rtol=1e-4, atol=1e-2)
 
@@ -230,8 +229,13 @@ def test_derivatives_come_from_casadi():
     rng = np.random.default_rng(11)
     q, v, u = (rng.uniform(-1, 1, (10, 9)) for _ in range(3))
     p = Frames("world", "tool", [0.1, 0.0, 0.2]).parameters
-    _, values, jacobians = (part.copy() for part in residuals.evaluate(q, v, u, p))
-    np.testing.assert_array_equal(residuals.values(q, v, u, p)[1], values)
+    residuals.arrays["z"][:] = np.hstack([q, v, u])
+    residuals.set_parameters(p)
+    residuals.evaluate()
+    values, jacobians = (residuals.arrays[name].copy() for name in ("values", "jacobians"))
+    residuals.arrays["values"][:] = np.nan
+    residuals.evaluate_values()
+    np.testing.assert_array_equal(residuals.arrays["values"], values)
     z = ca.SX.sym("z", 27)
     jacobian = ca.Function("j", [z], [ca.densify(ca.jacobian(residuals.expression(z, p), z))])
     affine = residuals.affine

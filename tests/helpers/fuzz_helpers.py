@@ -27,7 +27,7 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Shape
-from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
+from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
 
 PERIOD = 0.05  # [s]
 CLEARANCE = 0.15  # of the robot at the start [m]

@@ -94,7 +94,7 @@ def asking(values, *groups, frames=None):
 
 def roll(controller, intents, q=HOME, period=PERIOD):
     """Run a controller on a robot that does as it is told; return positions, velocities and commands."""
-    positions, velocities, commands = [np.array(q)], [REST], []
+    positions, velocities, commands = [np.array(q)], [np.zeros(len(q))], []
     for step, ask in enumerate(intents):
         time = step * period
         command = controller.update(State(positions[-1], velocities[-1], time), ask(time))

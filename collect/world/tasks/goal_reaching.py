@@ -8,7 +8,6 @@ import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.numerics.rotation import rotation_vector
 from handrail.controllers.robot.model import Pose
 
@@ -40,17 +39,9 @@ def pose_error(position: FloatArray, rotation: FloatArray, goal: Pose) -> tuple[
         rotation: world from tool, (3, 3).
         goal: to compare with.
     """
-    return _pose_error(position, rotation, goal.position, goal.rotation)
-
-
-@exact_jit
-def _pose_error(position, rotation, goal, orientation):
-    way, trace = 0.0, 0.0
-    for i in range(3):
-        way += (position[i] - goal[i]) ** 2
-        for j in range(3):
-            trace += rotation[i, j] * orientation[i, j]
-    return sqrt(way), min(max((3.0 - trace) / 4.0, 0.0), 1.0)
+    way = position - goal.position
+    trace = float(rotation.ravel() @ goal.rotation.ravel())
+    return sqrt(way @ way), min(max((3.0 - trace) / 4.0, 0.0), 1.0)
 
 
 def reached(d_p: float, d_r: float) -> bool:

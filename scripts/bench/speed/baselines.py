@@ -1,4 +1,4 @@
-"""What the controller is measured against: the converged solver and a core in C on its problems, and mink."""
+"""What the controller is measured against: the converged solver on its problems, and mink."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +12,6 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.solvers.converged import ConvergedSolver
 from handrail.scripts.bench.report import spread
-from handrail.scripts.bench.speed.compiled_core import CoreSolver, library
 from handrail.scripts.bench.speed.timing_loop import PERIOD, TimingLoop, Update
 
 Solve = Callable[[Update], float | None]
@@ -72,18 +71,6 @@ def converged(loop: TimingLoop) -> Solve:
         start = perf_counter()
         plan = solver.solve(update.problem, update.guess)
         return perf_counter() - start if plan.solved else None
-
-    return solve
-
-
-def core(loop: TimingLoop) -> Solve:
-    """Return the sketch of a compiled core, begun from the same guess and from its own active rows."""
-    library()  # compiled before anything is timed
-    solver = CoreSolver(loop.mpc)
-
-    def solve(update: Update) -> float | None:
-        seconds, found = solver.solve(update.problem, update.obstacles, update.guess)
-        return seconds if found.solved else None
 
     return solve
 

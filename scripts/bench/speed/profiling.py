@@ -12,8 +12,7 @@ from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.scripts.bench.report import machine, report, spread
-from handrail.scripts.bench.speed.baselines import Rival, converged, core, mink
-from handrail.scripts.bench.speed.compiled_core import compiler
+from handrail.scripts.bench.speed.baselines import Rival, converged, mink
 from handrail.scripts.bench.speed.config import ProfileConfig
 from handrail.scripts.bench.speed.qp import compare_qp
 from handrail.scripts.bench.speed.tables import profile_tables
@@ -80,9 +79,7 @@ def _baselines(config: ProfileConfig, loops: dict[str, TimingLoop]) -> dict[str,
     """Return what is measured besides, by the name of the ratio."""
     bare, pairs = loops["no_collision"], loops["pairs_30"]
     every, seldom = (max(config.updates // max(count, 1), 1) for count in (config.solves, config.solves // 4))
-    cores = {f"ratio_vs_core_{name}": Rival("core", loop, core(loop)) for name, loop in loops.items()}
     return {
-        **(cores if compiler() else {}),
         "ratio_vs_ipopt": Rival("ipopt", bare, converged(bare), every),
         "ratio_vs_ipopt_pairs_30": Rival("ipopt", pairs, converged(pairs), seldom),
         "ratio_vs_mink": Rival("mink", pairs, mink(pairs, ACTIVATION_DISTANCE)),

@@ -10,9 +10,10 @@ import numpy as np
 from scipy import sparse
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.core.library import Memory, functions
 from handrail.controllers.errors import not_installed
-from handrail.controllers.solvers.active_set import NOTHING_ACTIVE, ActiveSet, QuadraticProgram
 from handrail.controllers.solvers.dense import DenseProgram, dense
+from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
 from handrail.scripts.bench.report import spread
 from handrail.scripts.bench.speed.timing_loop import SpeedCase, TimingLoop, longer
 
@@ -22,24 +23,23 @@ _SMALL = 1e-3  # objective that counts as little
 Solve = Callable[[], FloatArray | None]
 """What is timed: returns the solution (s, σ), (m,), or None."""
 
-QpSolver = Callable[[QuadraticProgram, DenseProgram], Solve]
-"""Takes the next QP of a sequence in the form that the solver wants."""
+QpSolver = Callable[[Memory, Memory, DenseProgram], Solve]
+"""Takes the next QP of a sequence, in the core and as dense matrices; the core solves it once, and last."""
 
 
-def _own(horizon: int, size: int) -> QpSolver:
+def _own() -> QpSolver:
     """Return the controller's active-set method; begins with the rows that were active in the last QP."""
-    solver, active = ActiveSet(horizon, size), NOTHING_ACTIVE
+    active = NOTHING_ACTIVE
 
-    def take(program: QuadraticProgram, same: DenseProgram) -> Solve:
-        own = program._replace(band=program.band.copy())  # H is overwritten
+    def take(core: Memory, scene: Memory, same: DenseProgram) -> Solve:
+        core.active[: len(active)], core.fields.active_rows, core.fields.work = active, len(active), np.inf
+        solve_program = functions().solve_program
 
         def solve() -> FloatArray | None:
             nonlocal active
-            answer = solver.solve(own, active)
-            active = answer.active
-            dt = own.constraints.matrix[1, 2]  # v_k = dt (s_k - s_{k-1})
-            s = np.cumsum(solver.motion[:, 1], axis=0) / dt
-            return np.append(s, answer.slack) if answer.solved else None
+            solved = solve_program(core, scene)
+            active = core.active[: core.fields.active_rows].copy()
+            return np.append(core.s, core.slacks) if solved else None
 
         return solve
 
@@ -50,7 +50,7 @@ def _daqp() -> QpSolver:
     """Return DAQP, a dual active-set method for dense QPs; begins like our own."""
     active = np.zeros(0, dtype=np.int64)
 
-    def take(program: QuadraticProgram, same: DenseProgram) -> Solve:
+    def take(core: Memory, scene: Memory, same: DenseProgram) -> Solve:
         sense = np.isin(same.rows, active).astype(np.int32)
         least = np.full(len(same.upper), -1e30)
 
@@ -72,7 +72,7 @@ def _piqp() -> QpSolver:
     except ImportError as error:
         raise not_installed("the comparison of QP solvers", "piqp", "profile") from error
 
-    def take(program: QuadraticProgram, same: DenseProgram) -> Solve:
+    def take(core: Memory, scene: Memory, same: DenseProgram) -> Solve:
         hessian, matrix = sparse.csc_matrix(same.hessian), sparse.csc_matrix(same.matrix)
 
         def solve() -> FloatArray | None:
@@ -95,15 +95,15 @@ def compare_qp(count: int, seed: int, horizons: tuple[int, ...] = (10, 40)) -> d
 
 def _compared(case: SpeedCase, count: int, seed: int) -> dict[str, Any]:
     loop = TimingLoop(case, seed)
-    solvers = {"own": _own(case.horizon, loop.model.size), "daqp": _daqp(), "piqp": _piqp()}
+    solvers = {"daqp": _daqp(), "piqp": _piqp(), "own": _own()}
     programs: list[DenseProgram] = []
     answers: dict[str, list[FloatArray | None]] = {name: [] for name in solvers}
     seconds: dict[str, list[float]] = {name: [] for name in solvers}
     for update in loop.run(count + 1):
-        program = loop.mpc.solver.program(update.problem, update.guess)
-        programs.append(dense(program))
+        core, scene = loop.mpc.solver.program(update.problem, update.guess), update.problem.collision.memory
+        programs.append(dense(core, scene))
         for name, take in solvers.items():
-            solve = take(program, programs[-1])
+            solve = take(core, scene, programs[-1])
             start = perf_counter()
             answers[name].append(solve())
             seconds[name].append(perf_counter() - start)

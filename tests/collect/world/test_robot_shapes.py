@@ -6,9 +6,10 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 import pytest
+from coal_helpers import by_coal
 
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.collision.shape_pairs import FLOOR, ShapePairs
+from handrail.controllers.collision.shape_pairs import FLOOR
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
@@ -35,16 +36,8 @@ def configurations(model: RobotModel, count: int) -> np.ndarray:
 
 def distances(model: RobotModel, pairs: list[tuple[str, str]], q: np.ndarray) -> np.ndarray:
     """Return the signed distances of any pairs of the robot's shapes and the floor, (K, P)."""
-    shapes = ShapePairs(model, ())
-    shapes.geometry.removeAllCollisionPairs()
-    for pair in pairs:
-        shapes.geometry.addCollisionPair(pin.CollisionPair(*map(shapes.geometry.getGeometryId, pair)))
-    data, results = model.pinocchio.createData(), pin.GeometryData(shapes.geometry)
-    values = np.empty((len(q), len(pairs)))
-    for k, each in enumerate(q):
-        pin.computeDistances(model.pinocchio, data, shapes.geometry, results, each)
-        values[k] = [result.min_distance for result in results.distanceResults]
-    return values
+    measure = by_coal(model, (), pairs)
+    return np.array([measure(each) for each in q])
 
 
 def joints(model: RobotModel) -> dict[str, int]:

@@ -19,7 +19,7 @@
 #define BAND 30         /* numbers touched for each variable and change besides the active rows */
 
 /* H = L L' in place: band[j, i - j] = H[i, j], (M, B); return whether it is positive definite. */
-static int factor(double *band, int64_t size, int64_t width) {
+int64_t factor(double *band, int64_t size, int64_t width) {
   for (int64_t j = 0; j < size; j++) {
     double *row = band + j * width;
     if (!(row[0] > 0.0)) return 0;
@@ -130,9 +130,9 @@ static void settle(Core *c, int64_t count) {
 }
 
 /* Write m_p of a row; return its right-hand side. */
-static double transform(Core *c, int64_t place) {
+static double transform(Core *c, const Scene *scene, int64_t place) {
   int64_t first;
-  double right = write_row(c, place, c->fresh, &first), root = sqrt(c->quadratic);
+  double right = write_row(c, scene, place, c->fresh, &first), root = sqrt(c->quadratic);
   forward(c, c->fresh, first);
   for (int64_t i = c->M; i < c->V; i++) c->fresh[i] /= root;
   return right;
@@ -143,10 +143,10 @@ static int independent(const Core *c, double square) {
 }
 
 /* Make rows active, less those with a negative multiplier; write y; return their number. */
-static int64_t begin(Core *c, const int64_t *places, int64_t number) {
+static int64_t begin(Core *c, const Scene *scene, const int64_t *places, int64_t number) {
   int64_t count = 0;
   for (int64_t i = 0; i < number; i++) {
-    double right = transform(c, places[i]) + dot(c->fresh, c->free_point, c->V), square = project(c, count);
+    double right = transform(c, scene, places[i]) + dot(c->fresh, c->free_point, c->V), square = project(c, count);
     if (independent(c, square)) count = append(c, count, places[i], square, right, 0.0);
   }
   for (;;) {
@@ -160,8 +160,8 @@ static int64_t begin(Core *c, const int64_t *places, int64_t number) {
 }
 
 /* Make a violated row active; return the new number of active rows, -1 where there is no answer. */
-static int64_t enter(Core *c, int64_t count, int64_t place) {
-  double right = transform(c, place), multiplier = 0.0;
+static int64_t enter(Core *c, const Scene *scene, int64_t count, int64_t place) {
+  double right = transform(c, scene, place), multiplier = 0.0;
   for (;;) {
     c->changes++;
     c->work -= (double)c->V * (count + BAND);
@@ -183,35 +183,35 @@ static int64_t enter(Core *c, int64_t count, int64_t place) {
 }
 
 /* Solve with rows to begin with; return the number of active rows, -1 where there is no answer. */
-static int64_t solve_from(Core *c, const int64_t *places, int64_t number) {
+static int64_t solve_from(Core *c, const Scene *scene, const int64_t *places, int64_t number) {
   double root = sqrt(c->quadratic);
   memset(c->is_held, 0, (SLACKS + 6 * c->M + c->count) * sizeof(int64_t));
   c->changes = 0;
-  int64_t settled = 0, count = begin(c, places, number);
+  int64_t settled = 0, count = begin(c, scene, places, number);
   c->work -= number * c->V * (0.5 * number + BAND);
   for (;;) {
     memcpy(c->s, c->y, c->M * sizeof(double));
     backward(c, c->s);
-    for (int i = 0; i < SLACKS; i++) c->slack[i] = c->y[c->M + i] / root;
+    for (int i = 0; i < SLACKS; i++) c->slacks[i] = c->y[c->M + i] / root;
     to_motion(c, c->s, c->motion);
-    int64_t place = most_violated(c);
+    int64_t place = most_violated(c, scene);
     if (c->work <= 0.0) return count;
     if (place < 0) {
       if (settled == c->changes) return count;
       settled = c->changes; /* once more, without the rounding errors of the changes */
       settle(c, count);
-    } else if ((count = enter(c, count, place)) < 0) {
+    } else if ((count = enter(c, scene, count, place)) < 0) {
       return -1;
     }
   }
 }
 
-/* Solve the QP; write g's + 1/2 s'H s; return whether there is an answer. */
-int solve_program(Core *c, double *descent) {
+/* Solve the QP, H in the band, which its factor replaces; return whether there is an answer. */
+int64_t solve_program(Core *c, const Scene *scene) {
   static const int64_t AT_REST[SLACKS] = {OWN, STANDING, MOVING, LIMITS};
   int64_t count = -1, warm = 0;
-  memset(c->slack, 0, SLACKS * sizeof(double));
-  *descent = 0.0;
+  memset(c->slacks, 0, SLACKS * sizeof(double));
+  c->descent = 0.0;
   if (!factor(c->band, c->M, c->B)) return 0;
   memcpy(c->free_point, c->slope, c->M * sizeof(double));
   forward(c, c->free_point, 0);
@@ -220,10 +220,10 @@ int solve_program(Core *c, double *descent) {
     int64_t place = place_of(c, c->active[i]);
     if (place >= 0) c->active[warm++] = place;
   }
-  count = solve_from(c, c->active, warm);
-  if (count < 0) count = solve_from(c, AT_REST, SLACKS);
+  count = solve_from(c, scene, c->active, warm);
+  if (count < 0) count = solve_from(c, scene, AT_REST, SLACKS);
   c->active_rows = count < 0 ? 0 : count;
   for (int64_t i = 0; i < count; i++) c->active[i] = number_at(c, c->held[i]);
-  *descent = dot(c->slope, c->s, c->M) + 0.5 * dot(c->y, c->y, c->M);
+  c->descent = dot(c->slope, c->s, c->M) + 0.5 * dot(c->y, c->y, c->M);
   return count >= 0;
 }

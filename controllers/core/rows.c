@@ -7,12 +7,11 @@
 #include "vector.h"
 
 #define NODES 1000  /* more than there are in any plan */
-#define RECOVERY 0.8 /* of a distance deficit that is left after each node */
 #define SCALE 10.0  /* a violation of 0.1 m counts like one of a whole joint limit */
 #define SLACK_TOLERANCE 1e-7
 #define DISTANCE_TOLERANCE 1e-6 /* [m] */
 
-static const double SHARES[3] = {1.0, 1e-3, 0.0}; /* of the limits' slack that (q, v, u) get */
+static const double SHARES[3] = {1.0, VELOCITY_SLACK, 0.0}; /* of the limits' slack that (q, v, u) get */
 static const double TOLERANCES[3] = {1e-5, 1e-5, 1e-7};
 
 static int64_t joint_rows(const Core *c) { return SLACKS + 6 * c->M; }
@@ -49,19 +48,25 @@ static int can_fall(const Core *c, int64_t node, const double *gradient, double 
   return !(fall < left);
 }
 
-/* Take  d >= margin - deficit 0.8^k  at a node after now: a pair inside its margin recovers gradually. */
-void take_distance(void *core, int64_t node, int64_t pair, double value, const double *gradient) {
-  Core *c = core;
-  double deficit = LARGER(c->margins[pair] - c->found[pair], 0.0);
-  double left = value - c->margins[pair] + deficit * pow(RECOVERY, (double)node);
-  c->broken |= left < 0.0;
-  if (!can_fall(c, node, gradient, left)) return;
-  int64_t index = c->count++;
-  c->number[index] = joint_rows(c) + NODES * pair + node;
-  c->node[index] = node;
-  c->kind[index] = c->pair_slack[pair];
-  c->left[index] = left;
-  memcpy(c->gradient + index * c->n, gradient, c->n * sizeof(double));
+/* Take  d >= margin - deficit 0.8^k  of what was found near at nodes after now: a pair inside its margin recovers
+   gradually. Rows that cannot be met are left out. */
+void take_distances(Core *c, const Scene *scene) {
+  int64_t n = c->n, found = c->count;
+  c->count = 0;
+  for (int64_t i = 0; i < found; i++) {
+    int64_t node = c->near[2 * i], pair = c->near[2 * i + 1], index = c->count;
+    const double *gradient = c->gradient + i * n;
+    double deficit = LARGER(c->margins[pair] - c->found[pair], 0.0);
+    double left = c->found[node * scene->P + pair] - c->margins[pair] + deficit * pow(RECOVERY, (double)node);
+    c->broken |= left < 0.0;
+    if (!can_fall(c, node, gradient, left)) continue;
+    c->near[2 * index] = node;
+    c->near[2 * index + 1] = pair;
+    c->number[index] = joint_rows(c) + NODES * pair + node;
+    c->left[index] = left;
+    memmove(c->gradient + index * n, gradient, n * sizeof(double));
+    c->count++;
+  }
 }
 
 /* Return the place of a row by its number; -1 where it is not in this update. */
@@ -79,13 +84,13 @@ int64_t number_at(const Core *c, int64_t place) {
 }
 
 /* Return the place of the row that (s, sigma) breaks most, active ones left out; -1 if none. */
-int64_t most_violated(const Core *c) {
+int64_t most_violated(const Core *c, const Scene *scene) {
   int64_t n = c->n, row = -1, first = joint_rows(c);
   double worst = 0.0;
   for (int64_t i = 0; i < SLACKS; i++)
-    if (-c->slack[i] > LARGER(worst, SLACK_TOLERANCE) && !c->is_held[i]) worst = -c->slack[i], row = i;
+    if (-c->slacks[i] > LARGER(worst, SLACK_TOLERANCE) && !c->is_held[i]) worst = -c->slacks[i], row = i;
   for (int part = 0; part < 3; part++) {
-    double allowed = 1.0 + c->slack[LIMITS] * SHARES[part], least = allowed + TOLERANCES[part];
+    double allowed = 1.0 + c->slacks[LIMITS] * SHARES[part], least = allowed + TOLERANCES[part];
     for (int64_t k = 0; k < c->N; k++)
       for (int64_t j = 0; j < n; j++) {
         int64_t index = (k * 3 + part) * n + j;
@@ -96,14 +101,14 @@ int64_t most_violated(const Core *c) {
       }
   }
   for (int64_t index = 0; index < c->count; index++) {
-    int64_t node = c->node[index], stage = SMALLER(node, c->N) - 1;
+    int64_t node = c->near[2 * index], stage = SMALLER(node, c->N) - 1;
     const double *g = c->gradient + index * n, *dq = c->motion + 3 * stage * n;
     double change = -dot(g, dq, n);
     if (node > c->N) {
       const double *gain = c->gains + (node - c->N - 1) * n;
       for (int64_t j = 0; j < n; j++) change -= g[j] * gain[j] * dq[n + j];
     }
-    double excess = change - c->left[index] - c->slack[c->kind[index]];
+    double excess = change - c->left[index] - c->slacks[scene->slack[c->near[2 * index + 1]]];
     if (excess > DISTANCE_TOLERANCE && SCALE * excess > worst && !c->is_held[first + index])
       worst = SCALE * excess, row = first + index;
   }
@@ -111,9 +116,9 @@ int64_t most_violated(const Core *c) {
 }
 
 /* Write (c, -a) of a row, (M + 4), and its first entry; return b. */
-double write_row(const Core *c, int64_t place, double *out, int64_t *first) {
+double write_row(const Core *c, const Scene *scene, int64_t place, double *out, int64_t *first) {
   int64_t n = c->n, M = c->M;
-  double row[192], g[192], right;
+  double row[3 * MOST_COORDINATES], g[3 * MOST_COORDINATES], right;
   memset(out, 0, c->V * sizeof(double));
   if (place < SLACKS) {
     out[M + place] = -1.0;
@@ -130,14 +135,14 @@ double write_row(const Core *c, int64_t place, double *out, int64_t *first) {
     out[M + LIMITS] = -SHARES[part];
     right = 1.0 - sign * c->joint_value[index];
   } else {
-    int64_t index = place - joint_rows(c), node = c->node[index];
+    int64_t index = place - joint_rows(c), node = c->near[2 * index];
     const double *gradient = c->gradient + index * n;
     stage = SMALLER(node, c->N) - 1;
     for (int64_t j = 0; j < n; j++) {
       row[j] = -gradient[j];
       if (node > c->N) row[n + j] = -c->gains[(node - c->N - 1) * n + j] * gradient[j];
     }
-    out[M + c->kind[index]] = -1.0;
+    out[M + scene->slack[c->near[2 * index + 1]]] = -1.0;
     right = c->left[index];
   }
   to_variables(c, row, g);

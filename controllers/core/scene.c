@@ -1,6 +1,6 @@
 /* Signed distances of pairs along a path, measured only where a pair can come below its limit.
 
-   A coordinate j brings a pair together by at most L_jp per unit, a thing that moves by |v_p| per second, so that
+   A coordinate j brings a pair together by at most L_jp per unit, a mover by |v_p| per second, so that
        d_p(q_k, t_k) >= d_p(q', t') - sum_j L_jp |q_k - q'|_j - |v_p| |t_k - t'|
    from any (q', t') where it is known: at the start, at the node before, at this node of the last path. */
 #include "core.h"
@@ -37,10 +37,11 @@ static Shape placed(Scene *s, int64_t index, double time) {
   double *rotation = s->placed_rotation + 9 * index, *position = s->placed_position + 3 * index;
   if (!s->placed[index]) {
     int64_t joint = s->carrier[index];
+    double centre[3];
+    along3(s->shape_position + 3 * index, time, s->velocity + 3 * index, centre);
     multiply(s->world_rotation + 9 * joint, s->shape_rotation + 9 * index, rotation);
-    rotate(s->world_rotation + 9 * joint, s->shape_position + 3 * index, position);
+    rotate(s->world_rotation + 9 * joint, centre, position);
     along3(position, 1.0, s->world_position + 3 * joint, position);
-    along3(position, time, s->velocity + 3 * index, position);
     s->placed[index] = 1;
   }
   return (Shape){s->kind[index], s->size + 3 * index, rotation, position};
@@ -79,75 +80,86 @@ static void gradient_of(const Scene *s, int64_t pair, const double *witness, dou
 }
 
 /* Raise lower bounds, (P), by what is known at another configuration. */
-static void raise(const Scene *s, const double *q, const double *there, double time, const double *known,
-                  double *bound, double *room) {
-  for (int64_t p = 0; p < s->P; p++) room[p] = known[p] - s->speed[p] * time;
+static void raise(Scene *s, const double *q, const double *there, double time, const double *known, double *values) {
+  for (int64_t p = 0; p < s->P; p++) s->bound[p] = known[p] - s->speed[p] * time;
   for (int64_t j = 0; j < s->n; j++) {
     double moved = fabs(q[j] - there[j]);
-    if (moved > 0.0) add(room, -moved, s->bounds + j * s->P, s->P);
+    if (moved > 0.0) add(s->bound, -moved, s->bounds + j * s->P, s->P);
   }
-  for (int64_t p = 0; p < s->P; p++) bound[p] = LARGER(bound[p], room[p]);
+  for (int64_t p = 0; p < s->P; p++) values[p] = LARGER(values[p], s->bound[p]);
 }
 
-static void measure_all(Scene *s, const double *q, double *values) {
+static void know_nothing(const Scene *s, double *values) {
+  for (int64_t p = 0; p < s->P; p++) values[p] = -INFINITY;
+}
+
+/* The rows of a path, where they are wanted. */
+typedef struct {
+  int64_t count, *near;
+  double *gradients;
+} Rows;
+
+/* Measure at a node the pairs whose lower bound is below its limit; write the gradients of those that are. */
+static void measure(Scene *s, int64_t node, const double *q, double time, const double *within, double *values,
+                    Rows *rows) {
   double witness[9];
-  if (s->now_known && !memcmp(s->now_q, q, s->n * sizeof(double))) {
-    memcpy(values, s->now, s->P * sizeof(double));
-    return;
-  }
-  place_joints(s, q);
-  for (int64_t p = 0; p < s->P; p++) values[p] = measured(s, p, 0.0, witness);
-  memcpy(s->now_q, q, s->n * sizeof(double));
-  memcpy(s->now, values, s->P * sizeof(double));
-  s->now_known = 1;
-}
-
-/* Measure at a node the pairs whose lower bound is below its limit; hand on those that are below it. */
-static void measure_near(Scene *s, int64_t node, const double *q, double time, double *values,
-                         const double *within, const Near *near) {
-  double witness[9], gradient[64];
   int is_placed = 0;
   for (int64_t p = 0; p < s->P; p++) {
     if (values[p] >= within[p]) continue;
     if (!is_placed) place_joints(s, q);
     is_placed = 1;
     values[p] = measured(s, p, time, witness);
-    if (near && !(values[p] >= within[p])) {
-      gradient_of(s, p, witness, gradient);
-      near->row(near->target, node, p, values[p], gradient);
-    }
+    if (!rows || values[p] >= within[p]) continue;
+    rows->near[2 * rows->count] = node;
+    rows->near[2 * rows->count + 1] = p;
+    gradient_of(s, p, witness, rows->gradients + rows->count++ * s->n);
   }
 }
 
-/* Write the distances, (count, P), along a path from now; of pairs that cannot come near, lower bounds. The next
-   path begins with what this one has found. */
-void scene_distances(Scene *s, int64_t count, const double *q, const double *times, double *values,
-                     const Near *near) {
+/* All distances at time 0; those of the same configuration among the same things are known. */
+static void measure_now(Scene *s, const double *q, double *values) {
+  double witness[9];
+  if (s->now_changes != s->changes || memcmp(s->now_q, q, s->n * sizeof(double))) {
+    place_joints(s, q);
+    for (int64_t p = 0; p < s->P; p++) s->now[p] = measured(s, p, 0.0, witness);
+    memcpy(s->now_q, q, s->n * sizeof(double));
+    s->now_changes = s->changes;
+  }
+  memcpy(values, s->now, s->P * sizeof(double));
+}
+
+/* Write the distances, (count, P), along a path from now; of pairs that cannot come near, lower bounds. Return for
+   how many a gradient is written, with node and pair, from the first node on for which they are wanted.
+   known: distances, or lower bounds of them, at other configurations among the same things that stand; or none. */
+int64_t scene_distances(Scene *s, int64_t count, const double *q, const double *times, const double *within,
+                        const double *known_q, const double *known, int64_t first, double *values, int64_t *near,
+                        double *gradients) {
   int64_t n = s->n, P = s->P;
-  int moving = 0;
-  for (int64_t p = 0; p < P; p++) moving |= s->speed[p] > 0.0;
-  measure_all(s, q, values);
+  Rows rows = {0, near, gradients};
+  measure_now(s, q, values);
+  if (first == 0) {
+    know_nothing(s, s->here);
+    measure(s, 0, q, times[0], within, s->here, &rows);
+  }
   for (int64_t k = 1; k < count; k++) {
     const double *here = q + k * n;
     double *there = values + k * P;
-    for (int64_t p = 0; p < P; p++) there[p] = -INFINITY;
-    raise(s, here, q, times[k], values, there, s->bound);
-    if (k > 1) raise(s, here, here - n, times[k] - times[k - 1], there - P, there, s->bound);
-    if (s->known_nodes == count) raise(s, here, s->known_q + k * n, 0.0, s->known + k * P, there, s->bound);
-    measure_near(s, k, here, times[k], there, near->within, near);
+    know_nothing(s, there);
+    raise(s, here, q, times[k], values, there);
+    if (k > 1) raise(s, here, here - n, times[k] - times[k - 1], there - P, there);
+    if (known) raise(s, here, known_q + k * n, 0.0, known + k * P, there);
+    measure(s, k, here, times[k], within, there, &rows);
   }
-  s->known_nodes = moving ? 0 : count;
-  memcpy(s->known_q, q, count * n * sizeof(double));
-  memcpy(s->known, values, count * P * sizeof(double));
+  return rows.count;
 }
 
-/* Write the same at configurations that are not a path from now; no gradients, and nothing is remembered. */
+/* Write the same at configurations; from a start, (n), and its distances now, where these are known. */
 void scene_values(Scene *s, int64_t count, const double *q, const double *times, const double *start,
                   const double *now, const double *within, double *values) {
   for (int64_t k = 0; k < count; k++) {
     double *there = values + k * s->P;
-    for (int64_t p = 0; p < s->P; p++) there[p] = -INFINITY;
-    if (now) raise(s, q + k * s->n, start, times[k], now, there, s->bound);
-    measure_near(s, k, q + k * s->n, times[k], there, within, 0);
+    know_nothing(s, there);
+    if (now) raise(s, q + k * s->n, start, times[k], now, there);
+    measure(s, k, q + k * s->n, times[k], within, there, 0);
   }
 }

@@ -1,4 +1,6 @@
 /* The plan of one update: Gauss-Newton steps around a guess, usually one. */
+#include <time.h>
+
 #include "core.h"
 #include "vector.h"
 
@@ -6,6 +8,7 @@
 #define LARGE 0.2             /* change of an acceleration near obstacles that asks for another step, by its limit */
 #define COARSE 0.01           /* share of the promised descent by which a linearised cost may be wrong, */
 #define SMALL 0.1             /* or of a descent that is this share of the cost */
+#define TOLERANCE 1e-6        /* of the hard limits */
 #define SMALLEST_SHARE 0.0625 /* of a step that makes the cost rise */
 
 /* By how much pairs overlap at any node that do not at the first, or not as much. */
@@ -18,15 +21,27 @@ static double depth(const Core *c) {
   return deepest;
 }
 
-/* Roll out accelerations; measure distances along them; take the rows of those that are near. */
+static double clock_now(void) {
+  struct timespec now;
+  timespec_get(&now, TIME_UTC);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* Roll out accelerations; measure distances along them; take the rows of those that are near. The next path begins
+   with what this one has found. */
 static void linearise(Core *c, Scene *scene) {
-  Near near = {c->within, c, take_distance};
+  int known = c->known_changes == scene->changes, moving = 0;
   roll_out(c, c->u, c->path, c->speeds);
   take_joints(c, c->path, c->speeds, c->u);
   reach_of(c, c->u);
   nodes_of(c, c->path, c->speeds);
-  c->count = 0;
-  scene_distances(scene, c->K, c->nodes, c->times, c->found, &near);
+  c->count = scene_distances(scene, c->K, c->nodes, c->times, c->within, c->known_q, known ? c->known : 0, 1, c->found,
+                             c->near, c->gradient);
+  take_distances(c, scene);
+  for (int64_t p = 0; p < c->P; p++) moving |= scene->speed[p] > 0.0;
+  c->known_changes = moving ? -1 : scene->changes;
+  memcpy(c->known_q, c->nodes, c->K * c->n * sizeof(double));
+  memcpy(c->known, c->found, c->K * c->P * sizeof(double));
 }
 
 /* Take u = guess within its limits; where that runs into something, the fastest stop, if it runs in less. */
@@ -52,8 +67,8 @@ static void begin(Core *c, Scene *scene) {
 /* Take the step, halved until the cost itself falls: Gauss-Newton alone may go round in circles. The rows are
    convex, so that from a guess within them a share of the step needs no more than that share of the slack. */
 static double damp(Core *c, double before) {
-  double linear = 0.0, square = dot(c->slack, c->slack, SLACKS);
-  for (int i = 0; i < SLACKS; i++) linear += c->slack[i];
+  double linear = 0.0, square = dot(c->slacks, c->slacks, SLACKS);
+  for (int i = 0; i < SLACKS; i++) linear += c->slacks[i];
   memcpy(c->guess, c->u, c->M * sizeof(double));
   for (double share = 1.0;; share *= 0.5) {
     for (int64_t i = 0; i < c->M; i++) {
@@ -79,20 +94,61 @@ static int is_far(const Core *c, double before, double after, double descent) {
   return 0;
 }
 
+/* Keep the speeds within their limits: cutting is monotone, so that no acceleration becomes larger. Begin with the
+   velocity that is being sent, and follow the plan within what accelerations allow. */
+static void finish(Core *c) {
+  int64_t n = c->n, size = c->N * n;
+  int fast = 0, other = 0;
+  for (int64_t i = 0; i < size; i++) fast |= !(fabs(c->speeds[n + i]) <= c->v_max[i % n]);
+  if (fast) {
+    for (int64_t i = 0; i < size; i++) {
+      double limit = c->v_max[i % n];
+      c->speeds[n + i] = clamp(c->speeds[n + i], -limit, limit);
+    }
+    for (int64_t i = 0; i < size; i++) c->u[i] = (c->speeds[n + i] - c->speeds[i]) / c->dt;
+    roll_out(c, c->u, c->path, c->speeds);
+  }
+  for (int64_t i = 0; i < size; i++) {
+    double bound = c->a_max[i % n] * (1.0 + TOLERANCE) + TOLERANCE;
+    c->solved &= fabs(c->u[i]) <= bound && isfinite(c->path[n + i]) && isfinite(c->speeds[n + i]);
+  }
+  for (int64_t j = 0; j < n; j++) other |= c->sent[j] != c->speeds[j];
+  if (!other) return;
+  memcpy(c->speeds, c->sent, n * sizeof(double));
+  for (int64_t i = 0; i < size; i++) {
+    double step = c->dt * c->a_max[i % n], before = c->speeds[i];
+    c->speeds[n + i] = clamp(c->speeds[n + i], before - step, before + step);
+    c->u[i] = (c->speeds[n + i] - before) / c->dt;
+    c->path[n + i] = c->path[i] + 0.5 * c->dt * (before + c->speeds[n + i]);
+  }
+}
+
+/* Write the QP of a step from the guess: H, g and the rows; return the cost of the guess. */
+double build_program(Core *c, Scene *scene) {
+  double start = clock_now();
+  for (int64_t p = 0; p < c->P; p++) c->within[p] = c->margins[p] + c->activation;
+  begin(c, scene);
+  double measured = clock_now(), cost = expand(c, c->path, c->speeds, c->u);
+  c->phases[0] += measured - start;
+  c->phases[1] += clock_now() - measured;
+  return cost;
+}
+
+
 /* Solve the problem that stands in the core. A step that is still large, and did not lead where its linearisation
    said, is followed by another; what is reached when the work is spent is the plan. */
-void core_solve(Core *c, Scene *scene) {
-  for (int64_t p = 0; p < c->P; p++) c->within[p] = c->margins[p] + c->activation;
+void solve_update(Core *c, Scene *scene) {
+  memset(c->phases, 0, 3 * sizeof(double));
   for (c->steps = 1;; c->steps++) {
-    double descent;
-    begin(c, scene);
+    double before = build_program(c, scene), start = clock_now();
     if (c->steps == 1) memcpy(c->distances, c->found, c->P * sizeof(double));
-    double before = expand(c, c->path, c->speeds, c->u);
     c->rows = c->count;
-    c->solved = solve_program(c, &descent);
+    c->solved = solve_program(c, scene);
+    double after = c->solved ? damp(c, before) : 0.0;
+    c->phases[2] += clock_now() - start;
     if (!c->solved) return;
-    double after = damp(c, before);
-    if (c->work <= 0.0 || c->steps > MORE_STEPS || !is_far(c, before, after, descent)) return;
+    if (c->work <= 0.0 || c->steps > MORE_STEPS || !is_far(c, before, after, c->descent)) break;
     memcpy(c->guess, c->u, c->M * sizeof(double));
   }
+  finish(c);
 }

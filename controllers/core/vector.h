@@ -12,6 +12,11 @@ static inline double clamp(double x, double low, double high) {
   return x < low ? low : (x > high ? high : x);
 }
 
+/* The larger; NaN where one is: a fault does not pass for safe. */
+static inline double larger_or_nan(double a, double b) {
+  return a > b || a != a ? a : b;
+}
+
 static inline double dot3(const double *a, const double *b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }

@@ -22,17 +22,18 @@ static void add_row(const Core *c, int64_t k, const double *g, double weight, do
   }
 }
 
-void constant_hessian(Core *c, const double *weights, double *band) {
-  double row[192], g[192];
-  memset(band, 0, c->M * c->B * sizeof(double));
+/* The part of the Hessian that the weights alone make. */
+void constant_hessian(Core *c) {
+  double row[3 * MOST_COORDINATES], g[3 * MOST_COORDINATES];
+  memset(c->constant, 0, c->M * c->B * sizeof(double));
   for (int64_t k = 0; k < c->N; k++)
     for (int64_t r = 0; r < c->A; r++) {
-      double weight = weights[k * c->R + c->affine[r]];
+      double weight = c->weights[k * c->R + c->affine[r]];
       if (!(weight > 0.0)) continue;
       memset(row, 0, c->B * sizeof(double));
       for (int64_t e = c->begins[r]; e < c->begins[r + 1]; e++) row[c->columns[e]] = c->entries[e];
       to_variables(c, row, g);
-      add_row(c, k, g, weight, 0.0, 0, band);
+      add_row(c, k, g, weight, 0.0, 0, c->constant);
     }
 }
 
@@ -52,7 +53,7 @@ static double curved_error(const Core *c, int64_t k, int64_t row) {
 
 /* Return the cost of a motion; write its slope and Hessian. */
 double expand(Core *c, const double *q, const double *v, const double *u) {
-  double total = 0.0, by_motion[192], g[192];
+  double total = 0.0, by_motion[3 * MOST_COORDINATES], g[3 * MOST_COORDINATES];
   take(c, q, v, u);
   c->evaluate();
   memcpy(c->band, c->constant, c->M * c->B * sizeof(double));
