@@ -1,5 +1,7 @@
 """Laws of the banded QP in the compiled core: basis, factor, active-set method against a dense solver."""
 
+from typing import Any
+
 import daqp
 import numpy as np
 import pytest
@@ -41,7 +43,7 @@ class Program:
         functions().to_motion(self.core, np.array(s), found)
         return found
 
-    def solve(self, active=NOTHING_ACTIVE, work=np.inf):
+    def solve(self, active=NOTHING_ACTIVE, work=np.inf) -> Any:
         """Return the solution (s, σ), or None where there is none."""
         core = self.core
         core.band[:], core.active[: len(active)] = self.band, active
