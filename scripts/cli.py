@@ -18,7 +18,7 @@ from handrail.datasets.printable import printable
 
 HELP_ALL, VERSION = "--help-all", "--version"
 STARTING = "Starting; this takes some seconds …"
-COMPILING = "Compiling the controller for this machine, once; this can take a minute …"
+COMPILING = "Compiling the objectives of this robot, once; this takes seconds …"
 
 
 def parse[Config](config: type[Config], prog: str, arguments: Sequence[str]) -> Config:

@@ -62,4 +62,4 @@ def test_a_command_says_it_on_standard_error_in_one_line():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "Compiling the controller for this machine, once; this can take a minute …\n"
+    assert done.stderr == "Compiling the objectives of this robot, once; this takes seconds …\n"
