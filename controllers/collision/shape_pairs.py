@@ -8,10 +8,10 @@ import coal
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
-from handrail.controllers.collision.motion_bounds import joints_of, motion_bounds
+from handrail.controllers.collision.motion_bounds import motion_bounds
 from handrail.controllers.core.library import Memory, constant
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import RobotModel, joints_of
 from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes, scene_shapes
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -125,10 +125,10 @@ class ShapePairs:
 
     def _take_joints(self) -> None:
         memory = self.memory
-        for joint in joints_of(self._model)[1:]:
-            memory.parent[joint.index], memory.slides[joint.index] = joint.parent, joint.travel is not None
-            memory.joint_rotation[joint.index] = joint.rotation.ravel()
-            memory.joint_position[joint.index], memory.joint_axis[joint.index] = joint.translation, joint.axis
+        for index, joint in enumerate(joints_of(self._model)):
+            memory.parent[index], memory.slides[index] = joint.parent, joint.prismatic
+            memory.joint_rotation[index] = joint.rotation.ravel()
+            memory.joint_position[index], memory.joint_axis[index] = joint.translation, joint.axis
 
     def _take_shapes(self) -> None:
         memory = self.memory

@@ -60,7 +60,11 @@ def _compiler() -> list[str] | None:
     for name in ("cc", "gcc", "clang"):
         if path := shutil.which(name):
             return [path]
-    return [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"] if importlib.util.find_spec("ziglang") else None
+    return (
+        [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
+        if importlib.util.find_spec("ziglang")
+        else None
+    )
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +17,7 @@ from handrail.controllers.robot.description import RobotDescription, load_descri
 from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.robot.urdf import check_urdf
 
+_AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
 
 
@@ -71,6 +73,38 @@ class RobotModel:
         return pin.computeFrameJacobian(
             self.pinocchio, self._data, q, self.frame_id(frame), pin.LOCAL_WORLD_ALIGNED
         ).copy()
+
+
+class Joint(NamedTuple):
+    """A joint: its parent, where it is on that, and its axis; joint k, from 1, moves coordinate k - 1."""
+
+    parent: int
+    translation: FloatArray
+    rotation: FloatArray
+    axis: FloatArray
+    prismatic: bool
+
+
+@lru_cache(maxsize=8)
+def joints_of(model: RobotModel) -> tuple[Joint, ...]:
+    """Return the joints, one a coordinate."""
+    return tuple(_joint(model, number) for number in range(1, model.pinocchio.njoints))
+
+
+def _joint(model: RobotModel, number: int) -> Joint:
+    joint, placement = model.pinocchio.joints[number], model.pinocchio.jointPlacements[number]
+    name = joint.shortname().removeprefix("JointModel")
+    if name in ("PX", "PY", "PZ", "RX", "RY", "RZ"):
+        axis = _AXES[name[1]]
+    elif name in ("RevoluteUnaligned", "PrismaticUnaligned"):
+        axis = np.array(joint.extract().axis)
+    else:
+        raise HandrailError(
+            f"joint {model.pinocchio.names[number]} of robot {model.description.name}: "
+            f"expected a revolute or prismatic joint, got {name}"
+        )
+    parts = placement.translation.copy(), placement.rotation.copy()
+    return Joint(model.pinocchio.parents[number], *parts, axis, name.startswith("P"))
 
 
 @lru_cache(maxsize=8)

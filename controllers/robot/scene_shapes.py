@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import RobotModel, joints_of
 from handrail.controllers.robot.parts import PlacedShape
 from handrail.controllers.robot.shape import Shape
 
@@ -70,19 +70,15 @@ def _heights(model: RobotModel) -> tuple[_Height, ...]:
 
 def _next_height(model: RobotModel, joint: int, parent: _Height) -> _Height:
     """Return the height of a joint whose parent's is known."""
-    kind, placement = model.pinocchio.joints[joint], model.pinocchio.jointPlacements[joint]
-    data = kind.createData()
-    kind.calc(data, pin.neutral(model.pinocchio)[kind.idx_q : kind.idx_q + kind.nq])
-    shift, axis = np.asarray(data.S).reshape(6)[:3], np.asarray(data.S).reshape(6)[3:]
-    limits = model.description.limits
-    travel = np.array([limits.position_lower[kind.idx_v], limits.position_upper[kind.idx_v]])
+    here, limits = joints_of(model)[joint - 1], model.description.limits
+    travel = np.array([limits.position_lower[joint - 1], limits.position_upper[joint - 1]])
     if parent.up is None:
-        slack = float(np.linalg.norm(shift) * np.abs(travel).max())
-        return _Height(parent.lowest - float(np.linalg.norm(placement.translation)) - slack, None, True)
-    up = placement.rotation.T @ parent.up
-    lift = float(up @ shift)
-    lowest = float(parent.lowest + parent.up @ placement.translation + np.min(lift * travel))
-    tilts = float(np.linalg.norm(np.cross(axis, up))) > 1e-6
+        slack = float(np.abs(travel).max()) if here.prismatic else 0.0
+        return _Height(parent.lowest - float(np.linalg.norm(here.translation)) - slack, None, True)
+    up = here.rotation.T @ parent.up
+    lift = float(up @ here.axis) if here.prismatic else 0.0
+    lowest = float(parent.lowest + parent.up @ here.translation + np.min(lift * travel))
+    tilts = not here.prismatic and float(np.linalg.norm(np.cross(here.axis, up))) > 1e-6
     return _Height(lowest, None if tilts else up, parent.varies or tilts or abs(lift) > 1e-6)
 
 

@@ -4,13 +4,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.model import RobotModel
-
-_AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
+from handrail.controllers.robot.model import Joint, RobotModel, joints_of
 
 
 @dataclass(frozen=True)
@@ -22,15 +18,6 @@ class SymbolicPose:
     jacobian: ca.SX
 
 
-@dataclass(frozen=True)
-class _Joint:
-    parent: int
-    translation: FloatArray
-    rotation: FloatArray
-    axis: FloatArray
-    prismatic: bool
-
-
 def symbolic_pose(model: RobotModel, q: ca.SX, frame: str = "tool") -> SymbolicPose:
     """Return the pose and the world-aligned geometric Jacobian of a frame at q, (n, 1).
 
@@ -38,7 +25,7 @@ def symbolic_pose(model: RobotModel, q: ca.SX, frame: str = "tool") -> SymbolicP
     prismatic one `(z, 0)`.
     """
     target = model.pinocchio.frames[model.frame_id(frame)]
-    joints = [_joint(model, index) for index in range(1, model.pinocchio.njoints)]
+    joints = joints_of(model)
     poses: list[tuple[ca.SX, ca.SX]] = _joint_poses(joints, q)
     origin, rotation = poses[target.parentJoint]
     position = origin + rotation @ target.placement.translation
@@ -51,14 +38,14 @@ def symbolic_pose(model: RobotModel, q: ca.SX, frame: str = "tool") -> SymbolicP
     return SymbolicPose(position, rotation @ target.placement.rotation, ca.horzcat(*columns))
 
 
-def _column(joint: _Joint, origin: ca.SX, rotation: ca.SX, position: ca.SX) -> ca.SX:
+def _column(joint: Joint, origin: ca.SX, rotation: ca.SX, position: ca.SX) -> ca.SX:
     axis = rotation @ joint.axis
     if joint.prismatic:
         return ca.vertcat(axis, ca.SX.zeros(3, 1))
     return ca.vertcat(ca.cross(axis, position - origin), axis)
 
 
-def _joint_poses(joints: list[_Joint], q: ca.SX) -> list[tuple[ca.SX, ca.SX]]:
+def _joint_poses(joints: tuple[Joint, ...], q: ca.SX) -> list[tuple[ca.SX, ca.SX]]:
     poses = [(ca.SX.zeros(3, 1), ca.SX.eye(3))]
     for index, joint in enumerate(joints):
         origin, rotation = poses[joint.parent]
@@ -76,25 +63,3 @@ def _rotation(axis: FloatArray, angle: ca.SX) -> ca.SX:
     outer = np.outer(axis, axis)
     cross = np.cross(np.eye(3), axis)
     return ca.SX(outer) + ca.cos(angle) * ca.SX(np.eye(3) - outer) + ca.sin(angle) * ca.SX(cross)
-
-
-def _joint(model: RobotModel, index: int) -> _Joint:
-    joint = model.pinocchio.joints[index]
-    name = joint.shortname().removeprefix("JointModel")
-    placement: pin.SE3 = model.pinocchio.jointPlacements[index]
-    if name in ("PX", "PY", "PZ", "RX", "RY", "RZ"):
-        axis = _AXES[name[1]]
-    elif name in ("RevoluteUnaligned", "PrismaticUnaligned"):
-        axis = np.array(joint.extract().axis)
-    else:
-        raise HandrailError(
-            f"joint {model.pinocchio.names[index]} of robot {model.description.name}: "
-            f"expected a revolute or prismatic joint, got {name}"
-        )
-    return _Joint(
-        parent=model.pinocchio.parents[index],
-        translation=placement.translation.copy(),
-        rotation=placement.rotation.copy(),
-        axis=axis,
-        prismatic=name.startswith("P"),
-    )
