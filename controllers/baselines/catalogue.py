@@ -9,21 +9,14 @@ from handrail.controllers.registry import Registry
 
 @dataclass(frozen=True)
 class ControllerSpec:
-    """A controller: one entry makes it.
+    """A controller: one entry makes it."""
 
-    Attributes:
-        name: that a teleop mode says.
-        build: `(model, period [s]) -> Controller`, or where that is, `module:name`.
-        help: what becomes of the command, in one line.
-        protects: whether it keeps more than the joints' limits.
-        objectives: whether `build` also takes what robot and task bring, `(model, period, objectives)`.
-    """
-
-    name: str
-    build: Callable[..., Any] | str
-    help: str
-    protects: bool = False
+    name: str  # that a teleop mode says
+    build: Callable[..., Any] | str  # `(model, period [s]) -> Controller`, or where that is, `module:name`
+    help: str  # what becomes of the command, in one line
+    protects: bool = False  # whether it keeps more than the joints' limits
     objectives: bool = False
+    """Whether `build` also takes what robot and task bring, `(model, period, objectives)`."""
 
 
 def _masked_mpc(model: Any, period: float, objectives: tuple[Any, ...]) -> Any:

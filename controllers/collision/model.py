@@ -15,17 +15,11 @@ from handrail.controllers.robot.shape import Obstacle
 
 @dataclass(frozen=True)
 class Distances:
-    """Signed distances of P pairs at K configurations, and the gradients of those that are near.
+    """Signed distances of P pairs at K configurations, and the gradients of those that are near."""
 
-    Attributes:
-        values: signed distances [m], negative when they overlap, (K, P).
-        near: indices (node, pair) of the R entries whose gradient is given, (R, 2).
-        gradients: derivatives of those entries by q, (R, n).
-    """
-
-    values: FloatArray
-    near: IntArray
-    gradients: FloatArray
+    values: FloatArray  # signed distances [m], negative when they overlap, (K, P)
+    near: IntArray  # indices (node, pair) of the R entries whose gradient is given, (R, 2)
+    gradients: FloatArray  # derivatives of those entries by q, (R, n)
 
 
 class CollisionModel:

@@ -17,22 +17,14 @@ class Surroundings:
 
     What the hand holds may have stood nearer to something when it was grasped. Then it may stay as near, and
     from there only come away: `m ← min(m_wanted, max(m, d))`; a grasp moves nothing.
-
-    Attributes:
-        collision: the pairs that keep apart; of the last scene that made sense.
-        margin: wanted between shapes [m].
-        work_margin: wanted between tool shapes and work surfaces [m].
-        margins: of each pair [m], (P,): what is wanted, or what the pair can keep.
-        unknown: whether something was grasped whose distances were not seen yet.
-        make_sense: whether what was seen last does; else the robot has to brake.
     """
 
-    collision: CollisionModel
-    margin: float
-    work_margin: float
-    margins: FloatArray
-    unknown: bool
-    make_sense: bool = True
+    collision: CollisionModel  # the pairs that keep apart; of the last scene that made sense
+    margin: float  # wanted between shapes [m]
+    work_margin: float  # wanted between tool shapes and work surfaces [m]
+    margins: FloatArray  # of each pair [m], (P,): what is wanted, or what the pair can keep
+    unknown: bool  # whether something was grasped whose distances were not seen yet
+    make_sense: bool = True  # whether what was seen last does; else the robot has to brake
 
     @classmethod
     def of(

@@ -23,16 +23,11 @@ class Channels:
 
     The base twist is in the base frame [m/s, m/s, rad/s]; the end-effector twist is (v, ω), world-aligned
     at the tool point [m/s, rad/s]; joint velocities are dq/dt, the base's in the world frame.
-
-    Attributes:
-        base: names of the base twist channels, none on a fixed base.
-        tool: names of the end-effector twist channels.
-        joints: names of the joint velocity channels.
     """
 
-    base: tuple[str, ...]
-    tool: tuple[str, ...]
-    joints: tuple[str, ...]
+    base: tuple[str, ...]  # names of the base twist channels, none on a fixed base
+    tool: tuple[str, ...]  # names of the end-effector twist channels
+    joints: tuple[str, ...]  # names of the joint velocity channels
 
     @classmethod
     def of(cls, description: "RobotDescription") -> "Channels":

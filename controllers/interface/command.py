@@ -28,21 +28,13 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """How the controller fared in one update.
+    """How the controller fared in one update."""
 
-    Attributes:
-        status: what happened.
-        solve_time: of the whole update [s].
-        slack: largest violation of a soft limit in the plan, in its own unit.
-        smallest_distance: smallest signed distance now, tool against work surfaces left out [m].
-        work_distance: smallest signed distance of the tool against work surfaces now [m].
-    """
-
-    status: Status = Status.OK
-    solve_time: float = 0.0
-    slack: float = 0.0
-    smallest_distance: float = np.inf
-    work_distance: float = np.inf
+    status: Status = Status.OK  # what happened
+    solve_time: float = 0.0  # of the whole update [s]
+    slack: float = 0.0  # largest violation of a soft limit in the plan, in its own unit
+    smallest_distance: float = np.inf  # smallest signed distance now, tool against work surfaces left out [m]
+    work_distance: float = np.inf  # smallest signed distance of the tool against work surfaces now [m]
 
 
 @dataclass(frozen=True)
@@ -50,14 +42,10 @@ class Command(Trajectory):
     """A velocity trajectory from now on, linear between its knots, at rest after the last.
 
     It began before now, `elapsed` > 0, where an earlier plan is being followed.
-
-    Attributes:
-        gripper: 0 open, 1 closed.
-        diagnostics: how the controller fared.
-        plan: what the controller intends beyond what it has certified, to be shown; None where it has no
-            plan. The robot is not sent it.
     """
 
-    gripper: float = 0.0
-    diagnostics: Diagnostics = field(default_factory=Diagnostics)
+    gripper: float = 0.0  # 0 open, 1 closed
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # how the controller fared
     plan: Trajectory | None = None
+    """What the controller intends beyond what it has certified, to be shown; None where it has no plan.
+    The robot is not sent it."""

@@ -14,24 +14,17 @@ from handrail.controllers.robot.shape import Obstacle
 
 @dataclass(frozen=True)
 class State:
-    """What is known of the robot at a time.
+    """What is known of the robot at a time."""
 
-    Attributes:
-        q: measured positions, (n,) [m, rad].
-        v: measured velocities, dq/dt, (n,) [m/s, rad/s].
-        time: on the robot's clock [s]; later at every update.
-        commanded: the velocity that the robot was sent last, (n,). It alone knows, for what is asked may be
-            limited on the way: controllers do not remember it. Left out of a robot that moves as it is told,
-            which is `v`.
-        expected: where it will be when it has done what it was sent so far, (n,): a robot that takes
-            positions, or is far away, lags behind. Left out of one that does not, which is `q`.
-    """
-
-    q: FloatArray
-    v: FloatArray
-    time: float = 0.0
+    q: FloatArray  # measured positions, (n,) [m, rad]
+    v: FloatArray  # measured velocities, dq/dt, (n,) [m/s, rad/s]
+    time: float = 0.0  # on the robot's clock [s]; later at every update
     commanded: FloatArray = None  # type: ignore[assignment]
+    """The velocity that the robot was sent last, (n,). It alone knows, for what is asked may be limited on
+    the way: controllers do not remember it. Left out of a robot that moves as it is told, which is `v`."""
     expected: FloatArray = None  # type: ignore[assignment]
+    """Where it will be when it has done what it was sent so far, (n,): a robot that takes positions, or is
+    far away, lags behind. Left out of one that does not, which is `q`."""
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""

@@ -12,17 +12,12 @@ _FARTHEST = 5.0  # farthest tool point from the tool frame [m]
 
 @dataclass(frozen=True)
 class Frames:
-    """How twists are meant.
+    """How twists are meant."""
 
-    Attributes:
-        base: frame of the base twist: `base` or `world`.
-        tool: frame of the end-effector twist: `world` or `tool`.
-        point: the tool point, in the tool frame [m], (3,).
-    """
-
-    base: str = "base"
-    tool: str = "world"
+    base: str = "base"  # frame of the base twist: `base` or `world`
+    tool: str = "world"  # frame of the end-effector twist: `world` or `tool`
     point: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """The tool point, in the tool frame [m], (3,)."""
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""

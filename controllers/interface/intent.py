@@ -19,24 +19,16 @@ _HALF = 0.5  # a gripper command beyond it closes
 
 @dataclass(frozen=True)
 class RawInput:
-    """What the input device read, before it became a command.
-
-    Attributes:
-        values: deflection of each input from −1 to 1, or a leader arm's joint angles [rad], by channel, (m,);
-            (0,) if it is not known.
-        axes: how many inputs the operator moves now.
-        switches: how often they changed to other inputs in this episode so far.
-        device: what they moved; empty for a script or a policy.
-        age: of the reading when it became a command [s].
-        round_trip: from what the device's screen showed to the answer, on one clock [s].
-    """
+    """What the input device read, before it became a command."""
 
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
-    axes: int = 0
-    switches: int = 0
-    device: str = ""
-    age: float = 0.0
-    round_trip: float = 0.0
+    """Deflection of each input from −1 to 1, or a leader arm's joint angles [rad], by channel, (m,); (0,)
+    if it is not known."""
+    axes: int = 0  # how many inputs the operator moves now
+    switches: int = 0  # how often they changed to other inputs in this episode so far
+    device: str = ""  # what they moved; empty for a script or a policy
+    age: float = 0.0  # of the reading when it became a command [s]
+    round_trip: float = 0.0  # from what the device's screen showed to the answer, on one clock [s]
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
@@ -45,26 +37,18 @@ class RawInput:
 
 @dataclass(frozen=True)
 class Intent:
-    """A partial command.
-
-    Attributes:
-        values: one number a channel, in the order of `Channels.names`, (m,); where the mask is
-            false they mean nothing.
-        mask: which channels the operator owns now, (m,).
-        gripper: 0 open, 1 closed.
-        mode: name of the teleop mode that made it.
-        time: when the operator asked [s], on the clock of the state; every new intent has a later one.
-        frames: in which frames the twists are meant, and for which point of the tool.
-        raw: what the input device read.
-    """
+    """A partial command."""
 
     values: FloatArray
-    mask: BoolArray
-    gripper: float = 0.0
-    mode: str = ""
+    """One number a channel, in the order of `Channels.names`, (m,); where the mask is false they mean
+    nothing."""
+    mask: BoolArray  # which channels the operator owns now, (m,)
+    gripper: float = 0.0  # 0 open, 1 closed
+    mode: str = ""  # name of the teleop mode that made it
     time: float = 0.0
-    frames: Frames = _USUAL
-    raw: RawInput = RawInput()
+    """When the operator asked [s], on the clock of the state; every new intent has a later one."""
+    frames: Frames = _USUAL  # in which frames the twists are meant, and for which point of the tool
+    raw: RawInput = RawInput()  # what the input device read
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""

@@ -36,16 +36,11 @@ class Extrapolated:
 
     s is the least-squares slope over the window; it fades with τ, so that the prediction levels off. The
     history begins anew when the mask changes.
-
-    Attributes:
-        window: how far back the trend is taken from [s].
-        fade: τ [s].
-        history: intents of the window.
     """
 
-    window: float = 0.3
-    fade: float = 0.2
-    history: tuple[Intent, ...] = ()
+    window: float = 0.3  # how far back the trend is taken from [s]
+    fade: float = 0.2  # τ [s]
+    history: tuple[Intent, ...] = ()  # intents of the window
 
     def after(self, intent: Intent) -> "Extrapolated":
         """Return the prediction that has heard an intent."""
@@ -113,16 +108,11 @@ class Smoothed:
     `τ ḟ = u - f` from rest, and with Ψ the prediction it smooths `û(t) = Ψ(t) + exp(-t / τ) (f - u)`, which
     is f itself as long as the command holds. The gain at rest is 1: a hand that follows arrives where the
     command leads, τ later. Steps and tremor become what a heavy arm can follow without effort.
-
-    Attributes:
-        predict: Ψ.
-        time_constant: τ, one or one a channel [s].
-        last: command and level now; None at rest, before the first intent.
     """
 
-    predict: Prediction
-    time_constant: float | FloatArray
-    last: Level | None = None
+    predict: Prediction  # Ψ
+    time_constant: float | FloatArray  # τ, one or one a channel [s]
+    last: Level | None = None  # command and level now; None at rest, before the first intent
 
     def after(self, intent: Intent) -> "Smoothed":
         """Return the prediction that has heard an intent."""

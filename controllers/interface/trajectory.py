@@ -11,17 +11,11 @@ _ROUNDING = 1e-5  # of a time, relative: no later than the last knot
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Velocities that are linear between knots.
+    """Velocities that are linear between knots."""
 
-    Attributes:
-        velocities: at the knots, (k, n) with k ≥ 2 [m/s, rad/s].
-        dt: time between knots [s].
-        elapsed: time that has passed since the first knot [s].
-    """
-
-    velocities: FloatArray
-    dt: float
-    elapsed: float = 0.0
+    velocities: FloatArray  # at the knots, (k, n) with k ≥ 2 [m/s, rad/s]
+    dt: float  # time between knots [s]
+    elapsed: float = 0.0  # time that has passed since the first knot [s]
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""

@@ -14,19 +14,12 @@ _TICK = 1e-4  # by which the state's clock advances from update to update at lea
 
 
 class InputHistory(NamedTuple):
-    """When the inputs of the updates so far came.
+    """When the inputs of the updates so far came."""
 
-    Attributes:
-        time: of the last state [s].
-        stamp: of the newest intent [s].
-        age: time since that came first [s].
-        jumped: whether the clock jumped back since.
-    """
-
-    time: float = -math.inf
-    stamp: float = -math.inf
-    age: float = 0.0
-    jumped: bool = False
+    time: float = -math.inf  # of the last state [s]
+    stamp: float = -math.inf  # of the newest intent [s]
+    age: float = 0.0  # time since that came first [s]
+    jumped: bool = False  # whether the clock jumped back since
 
     def at(self, time: float) -> "InputHistory":
         """Return the history at a state's time [s], which may be no number."""
@@ -51,14 +44,10 @@ class InputValidator:
     stale like any other. The state's clock must advance; one that stands still or jumps back is a fault, for
     then nobody knows how old anything is. After it jumped back a stamp that differs from the last one is new
     too: those of before may lie ahead now; what was there before the jump grows older all the same.
-
-    Attributes:
-        channels: of the robot.
-        timeout: age from which an intent is stale [s].
     """
 
-    channels: Channels
-    timeout: float
+    channels: Channels  # of the robot
+    timeout: float  # age from which an intent is stale [s]
 
     def check(
         self, state: State, intent: Intent, scene_makes_sense: bool, before: InputHistory

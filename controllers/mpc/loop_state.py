@@ -19,31 +19,19 @@ from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
 
 
 class LoopState(NamedTuple):
-    """The memory of a control loop. The velocity that was sent last is not in it: the robot knows that.
+    """The memory of a control loop. The velocity that was sent last is not in it: the robot knows that."""
 
-    Attributes:
-        surroundings: what stands around.
-        parameters: of all objectives, (k,).
-        predict: the intent prediction, which knows the intents so far.
-        inputs: when states and intents came.
-        command: that the robot follows; None before the first.
-        time: when that was sent [s].
-        period: time from the command before it [s].
-        plan: of the last update; None where the robot follows something else.
-        stored: the motion that `Backup` goes on with; None before the first.
-        active: names of the rows that were active in the last problem among these pairs.
-    """
-
-    surroundings: Surroundings
-    parameters: FloatArray
-    predict: Prediction
-    inputs: InputHistory = InputHistory()
-    command: Command | None = None
-    time: float = 0.0
-    period: float = 0.0
-    plan: Plan | None = None
-    stored: Trajectory | None = None
+    surroundings: Surroundings  # what stands around
+    parameters: FloatArray  # of all objectives, (k,)
+    predict: Prediction  # the intent prediction, which knows the intents so far
+    inputs: InputHistory = InputHistory()  # when states and intents came
+    command: Command | None = None  # that the robot follows; None before the first
+    time: float = 0.0  # when that was sent [s]
+    period: float = 0.0  # time from the command before it [s]
+    plan: Plan | None = None  # of the last update; None where the robot follows something else
+    stored: Trajectory | None = None  # the motion that `Backup` goes on with; None before the first
     active: IntArray = NOTHING_ACTIVE
+    """Names of the rows that were active in the last problem among these pairs."""
 
     def among(self, obstacles: tuple[Obstacle, ...]) -> "LoopState":
         """Return the state among the obstacles as they are now."""

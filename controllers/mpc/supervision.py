@@ -23,15 +23,10 @@ _UNHEARD = (Status.INVALID_STATE, Status.INVALID_SCENE, Status.INVALID_INTENT, S
 
 @dataclass(frozen=True)
 class Supervisor:
-    """Says what is sent.
+    """Says what is sent."""
 
-    Attributes:
-        limiter: knows the limits and the full stop.
-        settings: margins, horizon.
-    """
-
-    limiter: Limiter
-    settings: MpcSettings
+    limiter: Limiter  # knows the limits and the full stop
+    settings: MpcSettings  # margins, horizon
 
     def supervise(
         self, loop: LoopState, state: State, intent: Intent, plan: Plan | None, status: Status, start: float

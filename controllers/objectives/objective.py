@@ -13,19 +13,12 @@ from handrail.controllers.robot.symbolic import SymbolicPose, symbolic_pose
 
 @dataclass(frozen=True)
 class Stage:
-    """The symbols of one stage.
+    """The symbols of one stage."""
 
-    Attributes:
-        model: of the robot.
-        q: position after the stage, (n, 1).
-        v: velocity after it, (n, 1).
-        u: acceleration during it, (n, 1).
-    """
-
-    model: RobotModel
-    q: ca.SX
-    v: ca.SX
-    u: ca.SX
+    model: RobotModel  # of the robot
+    q: ca.SX  # position after the stage, (n, 1)
+    v: ca.SX  # velocity after it, (n, 1)
+    u: ca.SX  # acceleration during it, (n, 1)
 
     def pose(self, frame: str = "tool") -> SymbolicPose:
         """Return pose and Jacobian of a frame as expressions of q."""
@@ -34,18 +27,11 @@ class Stage:
 
 @dataclass(frozen=True)
 class Objective:
-    """A least-squares term `½ Σ w (r(q, v, u; p) - reference)²` of every stage.
+    """A least-squares term `½ Σ w (r(q, v, u; p) - reference)²` of every stage."""
 
-    Attributes:
-        name: what it is for; unique in a controller.
-        residual: the expression r of a stage and the parameters p, (rows, 1).
-        reference: what r should be, (rows,).
-        weights: mask of the commanded channels (m,) → w, (rows,).
-        parameters: p at the beginning, (k,); may be changed at every update.
-    """
-
-    name: str
-    residual: Callable[[Stage, ca.SX], ca.SX]
-    reference: FloatArray
-    weights: Callable[[BoolArray], FloatArray]
+    name: str  # what it is for; unique in a controller
+    residual: Callable[[Stage, ca.SX], ca.SX]  # the expression r of a stage and the parameters p, (rows, 1)
+    reference: FloatArray  # what r should be, (rows,)
+    weights: Callable[[BoolArray], FloatArray]  # mask of the commanded channels (m,) → w, (rows,)
     parameters: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """P at the beginning, (k,); may be changed at every update."""

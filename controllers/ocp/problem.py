@@ -18,36 +18,21 @@ class Problem:
     Soft, each kind with a slack of its own (slacks.py): velocity and position limits, and for every pair
     `d_p(q_k) ≥ margin_p`. The terminal set X_f asks the same of the stop from the last node:
     `q_N + ½ v_N |v_N| / a_max`, half way and at rest.
-
-    Attributes:
-        q: position now, (n,).
-        v: velocity now, (n,).
-        sent: velocity that is being sent, with which the plan begins, (n,).
-        dt: length of a stage [s].
-        reference: of every residual row, (N, r).
-        weights: of every residual row, (N, r).
-        parameters: p of the objectives, (k,).
-        limits: of the robot.
-        collision: the pairs that keep apart.
-        margins: smallest distance wanted of each pair [m], (P,).
-        activation_distance: distance beyond the margin at which a pair enters the problem [m].
-        slack_linear: ρ₁.
-        slack_quadratic: ρ₂.
     """
 
-    q: FloatArray
-    v: FloatArray
-    sent: FloatArray
-    dt: float
-    reference: FloatArray
-    weights: FloatArray
-    parameters: FloatArray
-    limits: Limits
-    collision: CollisionModel
-    margins: FloatArray
-    activation_distance: float
-    slack_linear: float
-    slack_quadratic: float
+    q: FloatArray  # position now, (n,)
+    v: FloatArray  # velocity now, (n,)
+    sent: FloatArray  # velocity that is being sent, with which the plan begins, (n,)
+    dt: float  # length of a stage [s]
+    reference: FloatArray  # of every residual row, (N, r)
+    weights: FloatArray  # of every residual row, (N, r)
+    parameters: FloatArray  # p of the objectives, (k,)
+    limits: Limits  # of the robot
+    collision: CollisionModel  # the pairs that keep apart
+    margins: FloatArray  # smallest distance wanted of each pair [m], (P,)
+    activation_distance: float  # distance beyond the margin at which a pair enters the problem [m]
+    slack_linear: float  # ρ₁
+    slack_quadratic: float  # ρ₂
 
     @property
     def horizon(self) -> int:
@@ -66,34 +51,22 @@ class Problem:
 
 @dataclass(frozen=True)
 class Plan:
-    """A solution: trajectories, slack, and how the solver fared.
+    """A solution: trajectories, slack, and how the solver fared."""
 
-    Attributes:
-        q: positions at the nodes, (N + 1, n).
-        v: velocities at the nodes, (N + 1, n).
-        u: accelerations of the stages, (N, n).
-        collision_slack: largest violation of a distance against its margin in the plan [m].
-        limit_slack: largest excess over a position limit, relative to half its range; velocity limits share
-            it with a thousandth of its size.
-        distances: signed distances now, (P,).
-        solved: whether the solver reports a solution.
-        iterations: of the solver.
-        rows: inequality rows of the last QP, bounds left out.
-        active: names of those that hold with equality, for the next problem among the same pairs.
-        phases: where the time went: `residuals`, `distances`, `solve` [s].
-    """
-
-    q: FloatArray
-    v: FloatArray
-    u: FloatArray
-    collision_slack: float
+    q: FloatArray  # positions at the nodes, (N + 1, n)
+    v: FloatArray  # velocities at the nodes, (N + 1, n)
+    u: FloatArray  # accelerations of the stages, (N, n)
+    collision_slack: float  # largest violation of a distance against its margin in the plan [m]
     limit_slack: float
-    distances: FloatArray
-    solved: bool
-    iterations: int
-    rows: int = 0
+    """Largest excess over a position limit, relative to half its range; velocity limits share it with a
+    thousandth of its size."""
+    distances: FloatArray  # signed distances now, (P,)
+    solved: bool  # whether the solver reports a solution
+    iterations: int  # of the solver
+    rows: int = 0  # inequality rows of the last QP, bounds left out
     active: IntArray = field(default_factory=lambda: np.empty(0, dtype=int))
-    phases: tuple[tuple[str, float], ...] = ()
+    """Names of those that hold with equality, for the next problem among the same pairs."""
+    phases: tuple[tuple[str, float], ...] = ()  # where the time went: `residuals`, `distances`, `solve` [s]
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""

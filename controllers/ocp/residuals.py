@@ -15,17 +15,11 @@ from handrail.controllers.robot.model import RobotModel
 
 @dataclass(frozen=True)
 class AffineRows:
-    """Rows `r = J z + c` of z = (q, v, u) whose Jacobian never changes.
+    """Rows `r = J z + c` of z = (q, v, u) whose Jacobian never changes."""
 
-    Attributes:
-        index: where they lie among all rows, (a,).
-        jacobian: J, (a, 3n).
-        offset: c, (a,).
-    """
-
-    index: IntArray
-    jacobian: FloatArray
-    offset: FloatArray
+    index: IntArray  # where they lie among all rows, (a,)
+    jacobian: FloatArray  # J, (a, 3n)
+    offset: FloatArray  # c, (a,)
 
 
 class StageResiduals:

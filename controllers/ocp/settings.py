@@ -15,57 +15,37 @@ _LENGTHS = ("margin", "work_margin", "activation_distance", "largest_speed", "le
 
 @dataclass(frozen=True)
 class MpcSettings:
-    """Settings of the masked MPC; weights are per squared unit of their residual.
+    """Settings of the masked MPC; weights are per squared unit of their residual."""
 
-    Attributes:
-        horizon: stages N.
-        dt: length of a stage [s].
-        decay: γ; stage k tracks the intent with weight γᵏ.
-        tracked_stages: stages M at which the intent is tracked; 0 for all.
-        tracking: weight of the commanded channels, the tool's rotation left out.
-        turn_tracking: weight of the tool's commanded rotation.
-        base_velocity: weight of base velocities that nobody commands.
-        arm_velocity: weight of arm velocities that nobody commands.
-        acceleration: weight of all accelerations.
-        posture: weight that draws the arm to its home posture while the tool is steered.
-        terminal_velocity: weight of the last velocity that nobody commands: the terminal cost V_f.
-        margin: signed distance kept between shapes [m].
-        work_margin: the same between tool shapes and work surfaces [m].
-        margin_share: share of the margin below which no pair comes in a stop.
-        activation_distance: distance beyond the margin at which a pair enters the problem [m].
-        slack_linear: linear penalty of the slack.
-        slack_quadratic: quadratic penalty of the slack.
-        largest_speed: speed above which a commanded translation of the tool is taken as this [m/s].
-        largest_rate: the same for its rotation [rad/s].
-        intent_timeout: age from which an intent is stale [s].
-        velocity_tolerance: how far a robot that cannot follow may fall behind the commanded velocity before
-            the plan waits for it, relative to the velocity limit; more than the measured velocity's noise.
-        length: what weighs as much as one radian [m]: weights of translations are divided by its square.
-    """
-
-    horizon: Annotated[int, Meta(ge=2)] = 10
-    dt: Positive = 0.1
-    decay: Annotated[float, Meta(gt=0, le=1)] = 0.9
-    tracked_stages: Count = 0
-    tracking: NonNegative = 1000.0
-    turn_tracking: NonNegative = 1000.0
-    base_velocity: NonNegative = 0.01
-    arm_velocity: NonNegative = 0.1
-    acceleration: NonNegative = 0.01
-    posture: NonNegative = 0.05
+    horizon: Annotated[int, Meta(ge=2)] = 10  # stages N
+    dt: Positive = 0.1  # length of a stage [s]
+    decay: Annotated[float, Meta(gt=0, le=1)] = 0.9  # γ; stage k tracks the intent with weight γᵏ
+    tracked_stages: Count = 0  # stages M at which the intent is tracked; 0 for all
+    tracking: NonNegative = 1000.0  # weight of the commanded channels, the tool's rotation left out
+    turn_tracking: NonNegative = 1000.0  # weight of the tool's commanded rotation
+    base_velocity: NonNegative = 0.01  # weight of base velocities that nobody commands
+    arm_velocity: NonNegative = 0.1  # weight of arm velocities that nobody commands
+    acceleration: NonNegative = 0.01  # weight of all accelerations
+    posture: NonNegative = 0.05  # weight that draws the arm to its home posture while the tool is steered
     terminal_velocity: NonNegative = 0.1
-    margin: NonNegative = 0.10
-    work_margin: NonNegative = 0.008
-    margin_share: NonNegative = 0.3
+    """Weight of the last velocity that nobody commands: the terminal cost V_f."""
+    margin: NonNegative = 0.10  # signed distance kept between shapes [m]
+    work_margin: NonNegative = 0.008  # the same between tool shapes and work surfaces [m]
+    margin_share: NonNegative = 0.3  # share of the margin below which no pair comes in a stop
     activation_distance: NonNegative = 0.15
-    slack_linear: NonNegative = 1e6
-    slack_quadratic: NonNegative = 1e6
+    """Distance beyond the margin at which a pair enters the problem [m]."""
+    slack_linear: NonNegative = 1e6  # linear penalty of the slack
+    slack_quadratic: NonNegative = 1e6  # quadratic penalty of the slack
     largest_speed: NonNegative = 2.0
-    largest_rate: NonNegative = 4.0
-    intent_timeout: NonNegative = DEAD_MAN_TIME
+    """Speed above which a commanded translation of the tool is taken as this [m/s]."""
+    largest_rate: NonNegative = 4.0  # the same for its rotation [rad/s]
+    intent_timeout: NonNegative = DEAD_MAN_TIME  # age from which an intent is stale [s]
     velocity_tolerance: NonNegative = 0.1
+    """How far a robot that cannot follow may fall behind the commanded velocity before the plan waits for
+    it, relative to the velocity limit; more than the measured velocity's noise."""
 
     length: Positive = 1.0
+    """What weighs as much as one radian [m]: weights of translations are divided by its square."""
 
     @classmethod
     def of(cls, scale: float, **values: float) -> Self:

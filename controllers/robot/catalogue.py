@@ -10,17 +10,11 @@ _FOLDER = Path(__file__).parent / "robots"
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """A robot: one description file makes it.
+    """A robot: one description file makes it."""
 
-    Attributes:
-        name: as on the command line.
-        file: its description; `robots/ridgeback_ur10.toml` explains the format.
-        help: one line.
-    """
-
-    name: str
-    file: Path
-    help: str = "comes with Handrail"
+    name: str  # as on the command line
+    file: Path  # its description; `robots/ridgeback_ur10.toml` explains the format
+    help: str = "comes with Handrail"  # one line
 
 
 ROBOTS = Registry("robot", RobotSpec, (RobotSpec(path.stem, path) for path in sorted(_FOLDER.glob("*.toml"))))

@@ -16,17 +16,12 @@ _UNEVEN = 0.05  # how far a floor may rise above the base's [m]
 
 @dataclass(frozen=True)
 class _Height:
-    """What is known of the height of a joint's origin at every configuration.
+    """What is known of the height of a joint's origin at every configuration."""
 
-    Attributes:
-        lowest: bound on it [m].
-        up: the vertical in the joint's axes, (3,), while no joint has tilted it; None after one has.
-        varies: whether any joint changes the height of what this joint carries.
-    """
-
-    lowest: float
+    lowest: float  # bound on it [m]
     up: FloatArray | None
-    varies: bool
+    """The vertical in the joint's axes, (3,), while no joint has tilted it; None after one has."""
+    varies: bool  # whether any joint changes the height of what this joint carries
 
 
 @lru_cache(maxsize=8)

@@ -16,16 +16,12 @@ _ROTATION_ERROR = 1e-5  # of a matrix that still is a rotation; float32 has abou
 
 @dataclass(frozen=True)
 class Shape:
-    """A convex shape in its own frame, centred, long axis z.
+    """A convex shape in its own frame, centred, long axis z."""
 
-    Attributes:
-        kind: what it is.
-        size: box: full lengths (x, y, z) [m]; capsule and cylinder: radius and length of the
-            straight part [m]; sphere: radius [m].
-    """
-
-    kind: ShapeKind
+    kind: ShapeKind  # what it is
     size: FloatArray
+    """Box: full lengths (x, y, z) [m]; capsule and cylinder: radius and length of the straight part [m];
+    sphere: radius [m]."""
 
     def __post_init__(self) -> None:
         """Check the size."""
@@ -41,25 +37,16 @@ class Shape:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A shape in the scene, or one that the robot holds.
+    """A shape in the scene, or one that the robot holds."""
 
-    Attributes:
-        name: unique in the scene.
-        shape: its geometry.
-        position: of its centre in the world, or in `frame` [m], (3,).
-        rotation: world, or `frame`, from shape, (3, 3).
-        velocity: of its centre in the world [m/s], (3,); predicted constant; none of what is held.
-        work_surface: whether tool shapes may come close to it (a table that is worked on).
-        frame: the robot's frame that it is fixed to because the hand holds it; empty for the world.
-    """
-
-    name: str
-    shape: Shape
-    position: FloatArray
-    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+    name: str  # unique in the scene
+    shape: Shape  # its geometry
+    position: FloatArray  # of its centre in the world, or in `frame` [m], (3,)
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))  # world, or `frame`, from shape, (3, 3)
     velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
-    work_surface: bool = False
-    frame: str = ""
+    """Of its centre in the world [m/s], (3,); predicted constant; none of what is held."""
+    work_surface: bool = False  # whether tool shapes may come close to it (a table that is worked on)
+    frame: str = ""  # the robot's frame that it is fixed to because the hand holds it; empty for the world
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""

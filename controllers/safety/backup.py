@@ -17,35 +17,23 @@ _SAME = 1e-6  # difference of velocities that is rounding [m/s, rad/s]
 
 
 class Situation(NamedTuple):
-    """Where the robot is, and what was stored.
+    """Where the robot is, and what was stored."""
 
-    Attributes:
-        q: measured position, (n,).
-        v: velocity that a command begins with, (n,).
-        distances: signed distances of all pairs, (P,) [m].
-        stored: the motion of the candidate taken last, from when that was on; None before the first.
-        elapsed: time since then [s].
-    """
-
-    q: FloatArray
-    v: FloatArray
-    distances: FloatArray
+    q: FloatArray  # measured position, (n,)
+    v: FloatArray  # velocity that a command begins with, (n,)
+    distances: FloatArray  # signed distances of all pairs, (P,) [m]
     stored: Trajectory | None
-    elapsed: float
+    """The motion of the candidate taken last, from when that was on; None before the first."""
+    elapsed: float  # time since then [s]
 
 
 class Candidate(NamedTuple):
-    """Something that the robot may do now.
-
-    Attributes:
-        motion: what is done for sure, unless a later update finds something better; then a full stop.
-        violation: of its safety.
-        planned: whether it begins with the new plan.
-    """
+    """Something that the robot may do now."""
 
     motion: Trajectory
-    violation: Violation
-    planned: bool = False
+    """What is done for sure, unless a later update finds something better; then a full stop."""
+    violation: Violation  # of its safety
+    planned: bool = False  # whether it begins with the new plan
 
 
 class Backup(NamedTuple):
@@ -61,16 +49,11 @@ class Backup(NamedTuple):
     An operator who is gone or talks nonsense has no plan, and wants 4 before 3. Where no way is safe,
     because an obstacle or the robot was moved by somebody else, it is the one that falls least short: first
     of keeping from itself and from what stands still, then of keeping from everything.
-
-    Attributes:
-        certificate: measures the ways.
-        limiter: knows the full stop.
-        dt: time between knots [s].
     """
 
-    certificate: StopCertificate
-    limiter: Limiter
-    dt: float
+    certificate: StopCertificate  # measures the ways
+    limiter: Limiter  # knows the full stop
+    dt: float  # time between knots [s]
 
     def choose(self, situation: Situation, plan: Plan | None, halt: bool = False) -> Candidate:
         """Return the way to take, whose motion is to be stored.

@@ -13,16 +13,12 @@ _WAITING = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a robot waits af
 
 
 class Violation(NamedTuple):
-    """How far a motion falls short of safety; of two the smaller is safer. 0 when it is safe [m, rad].
-
-    Attributes:
-        hard: of the hard limits of the robot with itself and with what stands still, and of the joints'
-            range. Nobody else moves these: what was safe once stays safe, and nothing is worth giving it up.
-        all: of all least distances.
-    """
+    """How far a motion falls short of safety; of two the smaller is safer. 0 when it is safe [m, rad]."""
 
     hard: float
-    all: float
+    """Of the hard limits of the robot with itself and with what stands still, and of the joints' range.
+    Nobody else moves these: what was safe once stays safe, and nothing is worth giving it up."""
+    all: float  # of all least distances
 
 
 class StopCertificate(NamedTuple):
@@ -30,20 +26,14 @@ class StopCertificate(NamedTuple):
 
     A motion is safe when no pair comes below its least distance and no joint leaves its range, or, where one
     is beyond already, no farther than now.
-
-    Attributes:
-        limiter: knows the limits and the full stop.
-        collision: the pairs.
-        least: distance of each pair that is kept, (P,) [m].
-        span: time for which the robot has to be safe, where obstacles move [s].
-        lag: how far the robot is from where it is expected, (n,): a motion has to be safe there, too.
     """
 
-    limiter: Limiter
-    collision: CollisionModel
-    least: FloatArray
-    span: float
+    limiter: Limiter  # knows the limits and the full stop
+    collision: CollisionModel  # the pairs
+    least: FloatArray  # distance of each pair that is kept, (P,) [m]
+    span: float  # time for which the robot has to be safe, where obstacles move [s]
     lag: FloatArray | None = None
+    """How far the robot is from where it is expected, (n,): a motion has to be safe there, too."""
 
     def violation(
         self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0

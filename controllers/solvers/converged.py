@@ -48,36 +48,22 @@ _OPTIONS = {
 
 
 class Evaluation(NamedTuple):
-    """What a motion costs, exactly, nothing linearised.
+    """What a motion costs, exactly, nothing linearised."""
 
-    Attributes:
-        tracking: weighted squared errors of all objectives.
-        slack: the least σ that do, (4,).
-        cost: all of it, with the penalties of the slacks.
-    """
-
-    tracking: float
-    slack: FloatArray
-    cost: float
+    tracking: float  # weighted squared errors of all objectives
+    slack: FloatArray  # the least σ that do, (4,)
+    cost: float  # all of it, with the penalties of the slacks
 
 
 @dataclass(frozen=True)
 class _Iterate:
-    """Accelerations, what they cost, and rows `A (s, σ) ≤ b` of the near pairs around them.
+    """Accelerations, what they cost, and rows `A (s, σ) ≤ b` of the near pairs around them."""
 
-    Attributes:
-        u: accelerations, (N, n).
-        exact: what they cost.
-        matrix: A; rows of zeros fill up, (R, N n + 4).
-        left: b, (R,).
-        near: (node, pair) of the rows that do not only fill up, (r, 2).
-    """
-
-    u: FloatArray
-    exact: Evaluation
-    matrix: FloatArray
-    left: FloatArray
-    near: IntArray
+    u: FloatArray  # accelerations, (N, n)
+    exact: Evaluation  # what they cost
+    matrix: FloatArray  # A; rows of zeros fill up, (R, N n + 4)
+    left: FloatArray  # b, (R,)
+    near: IntArray  # (node, pair) of the rows that do not only fill up, (r, 2)
 
 
 class _Solution(NamedTuple):
