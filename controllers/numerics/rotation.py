@@ -1,12 +1,11 @@
 """Rotations: matrices, quaternions (wxyz), rotation vectors.
 
-Numbers are SciPy's, bit for bit. What is asked many times in a control period is in the compiled core: for
+What is asked many times in a control period is in the compiled core: for
 one matrix SciPy's own functions take most of their time to check it.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.core.library import functions
@@ -28,7 +27,14 @@ def turned(planar: ArrayLike, angle: ArrayLike) -> FloatArray:
 
 def matrix_from_rpy(rpy: ArrayLike) -> FloatArray:
     """Return `Rz(yaw) Ry(pitch) Rx(roll)` as URDF defines it; angles [rad]."""
-    return Rotation.from_euler("xyz", np.asarray(rpy, dtype=float)).as_matrix()
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
 
 
 def matrix_to_axis(axis: ArrayLike) -> FloatArray:
@@ -48,14 +54,20 @@ def quaternion_from_matrix(matrix: ArrayLike) -> FloatArray:
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> FloatArray:
-    """Return the rotation matrix of a quaternion (w, x, y, z), (3, 3)."""
-    w, x, y, z = np.asarray(quaternion, dtype=float)
-    return Rotation.from_quat([x, y, z, w]).as_matrix()
+    """Return the rotation matrix of a quaternion (w, x, y, z), (3, 3): `I + 2 w [r]× + 2 [r]×²`, |q| = 1."""
+    w, *r = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
+    cross = np.cross(np.eye(3), r)
+    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
 
 
 def matrix_from_vector(vector: ArrayLike) -> FloatArray:
-    """Return the rotation matrix of a rotation vector (axis times angle) [rad], (3, 3)."""
-    return Rotation.from_rotvec(np.asarray(vector, dtype=float)).as_matrix()
+    """Return the rotation matrix of a rotation vector θ a [rad], (3, 3).
+
+    `I + sin θ / θ [θ a]× + (1 − cos θ) / θ² [θ a]×²`.
+    """
+    turn = np.asarray(vector, dtype=float)
+    share, cross = np.linalg.norm(turn) / np.pi, np.cross(np.eye(3), turn)
+    return np.eye(3) + np.sinc(share) * cross + 0.5 * np.sinc(0.5 * share) ** 2 * cross @ cross
 
 
 def rotation_vector(matrix: ArrayLike) -> FloatArray:
@@ -70,4 +82,6 @@ def _quaternion(matrix: ArrayLike) -> FloatArray:
     given, quaternion = np.ascontiguousarray(matrix, dtype=float), np.empty(4)
     if given.shape == (3, 3) and functions().quaternion_of(given, quaternion):
         return quaternion
+    from scipy.spatial.transform import Rotation  # half of the time that importing the controller would take
+
     return Rotation.from_matrix(given).as_quat()

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handrail.controllers.numerics.rotation import quaternion_from_matrix, rotation_vector
+from handrail.controllers.numerics.rotation import (
+    matrix_from_quaternion,
+    matrix_from_rpy,
+    matrix_from_vector,
+    quaternion_from_matrix,
+    rotation_vector,
+)
 
 ANGLES = (0.0, 1e-12, 1e-6, 9.9e-4, 1.1e-3, 0.3, 2.0, np.pi - 1e-3, np.pi - 1e-9, np.pi)
 
@@ -17,6 +23,20 @@ def rotations():
             matrix = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
             yield matrix
             yield matrix @ Rotation.random(rng=rng).as_matrix().T
+
+
+def test_matrices_are_scipys_but_for_rounding():
+    rng = np.random.default_rng(1)
+    for size in (1e-9, 1e-3, 1.0, np.pi, 4.0):
+        three, four = size * rng.standard_normal(3), rng.standard_normal(4)
+        pairs = [
+            (matrix_from_rpy(three), Rotation.from_euler("xyz", three)),
+            (matrix_from_vector(three), Rotation.from_rotvec(three)),
+            (matrix_from_quaternion(four), Rotation.from_quat(np.roll(four, -1))),
+        ]
+        for found, expected in pairs:
+            np.testing.assert_allclose(found, expected.as_matrix(), atol=1e-15)
+    np.testing.assert_array_equal(matrix_from_vector(np.zeros(3)), np.eye(3))
 
 
 def shortest(quaternion):
