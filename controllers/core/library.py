@@ -24,6 +24,13 @@ _CALLBACK = {
 }
 
 
+class Pointer:
+    """An array that C is given many times: its address is looked up once."""
+
+    def __init__(self, array: np.ndarray) -> None:
+        self.array, self.address = array, _Address.from_param(array)
+
+
 class _Address:
     """What C takes as a pointer: an array of its numbers, a structure, or None."""
 

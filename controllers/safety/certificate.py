@@ -48,8 +48,8 @@ class StopCertificate(NamedTuple):
             now: the position now, (n,), and its distances, (P,).
             delay: time until it begins [s].
         """
-        found, limits = np.empty(2), self.limiter.limits
-        bounds = limits.position_lower, limits.position_upper, limits.acceleration
+        found, limiter = np.empty(2), self.limiter
+        bounds = limiter.lower, limiter.upper, limiter.acceleration
         functions().stop_violation(
             self.collision.memory, q, v, delay, self.span, self.lag, *now, self.least, *bounds, found
         )
@@ -73,8 +73,8 @@ class StopCertificate(NamedTuple):
         """Return the same at every point of a motion, hard and of all, (K, 2)."""
         if self.lag is not None:
             path, times = np.vstack([path, path + self.lag]), np.tile(times, 2)
-        found, limits = np.empty((len(path), 2)), self.limiter.limits
-        path, bounds = np.ascontiguousarray(path), (limits.position_lower, limits.position_upper)
+        found, bounds = np.empty((len(path), 2)), (self.limiter.lower, self.limiter.upper)
+        path = np.ascontiguousarray(path)
         functions().path_violations(
             self.collision.memory, len(path), path, times, *now, self.least, *bounds, found
         )

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.core.library import Pointer
 from handrail.controllers.robot.description import RobotDescription
 
 _TOLERANCE = 1e-5  # relative; rounding to float32 is no violation
@@ -22,7 +23,9 @@ class Limiter:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self.limits = description.limits
+        self.limits = limits = description.limits
+        bounds = limits.position_lower, limits.position_upper, limits.acceleration
+        self.lower, self.upper, self.acceleration = map(Pointer, bounds)  # for the compiled core
 
     def limit(
         self, previous: FloatArray, target: FloatArray, duration: float, q: FloatArray | None = None
