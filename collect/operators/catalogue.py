@@ -9,20 +9,15 @@ from handrail.controllers.registry import Registry
 
 @dataclass(frozen=True)
 class OperatorSpec:
-    """An operator: one entry makes it.
+    """An operator: one entry makes it."""
 
-    Attributes:
-        name: as on the command line, and what the dataset says of who steered.
-        build: `(model, mode, task, human) -> Operator`, or where that is, `module:name`. It gets the robot's
-            model, the `TeleopMode`, the `TaskSpec`, and the `HumanSettings` of the person.
-        help: one line.
-        interactive: whether it is someone now at this computer: in real time, free to change the mode.
-    """
-
-    name: str
+    name: str  # as on the command line, and what the dataset says of who steered
     build: Callable[..., Any] | str
-    help: str
+    """`(model, mode, task, human) -> Operator`, or where that is, `module:name`. It gets the robot's
+    model, the `TeleopMode`, the `TaskSpec`, and the `HumanSettings` of the person."""
+    help: str  # one line
     interactive: bool = False
+    """Whether it is someone now at this computer: in real time, free to change the mode."""
 
 
 _DEVICES = "handrail.collect.devices.open_devices:open_device"

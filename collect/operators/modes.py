@@ -13,24 +13,17 @@ Focus = Literal["hand", "base"]
 
 @dataclass(frozen=True)
 class TeleopMode:
-    """A teleop mode: one entry makes it.
+    """A teleop mode: one entry makes it."""
 
-    Attributes:
-        name: as on the command line.
-        groups: channel groups that the operator owns, by focus: what they attend to now.
-        controller: what becomes of the command: a name of `CONTROLLERS`, or `module:name`.
-        help: one line.
-        device: what the operator has in hand: a name of `DEVICES`.
-        task_objectives: whether the masked MPC takes on the objectives that a task brings, and the channels
-            that the operator then leaves to them.
-    """
-
-    name: str
+    name: str  # as on the command line
     groups: Callable[[Focus], tuple[str, ...]]
-    controller: str
-    help: str
-    device: str = "sticks"
+    """Channel groups that the operator owns, by focus: what they attend to now."""
+    controller: str  # what becomes of the command: a name of `CONTROLLERS`, or `module:name`
+    help: str  # one line
+    device: str = "sticks"  # what the operator has in hand: a name of `DEVICES`
     task_objectives: bool = True
+    """Whether the masked MPC takes on the objectives that a task brings, and the channels that the
+    operator then leaves to them."""
 
     @property
     def by_focus(self) -> bool:

@@ -15,17 +15,12 @@ from handrail.controllers.robot.model import Pose
 
 @dataclass(frozen=True)
 class View:
-    """What an operator sees now.
+    """What an operator sees now."""
 
-    Attributes:
-        state: of the robot.
-        task: the truth of this moment.
-        observation: what is recorded of it: `agent_pos`, `environment_state`, and `pixels` by camera.
-    """
-
-    state: State
-    task: TaskState
+    state: State  # of the robot
+    task: TaskState  # the truth of this moment
     observation: Mapping[str, Any] = field(default_factory=dict)
+    """What is recorded of it: `agent_pos`, `environment_state`, and `pixels` by camera."""
 
     @property
     def tool(self) -> Pose:

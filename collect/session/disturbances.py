@@ -51,19 +51,12 @@ class DelayedOperator:
 
 @dataclass(frozen=True)
 class Push:
-    """A force that acts for a moment.
+    """A force that acts for a moment."""
 
-    Attributes:
-        start: when it begins [s].
-        end: when it ends [s].
-        hand: whether it acts at the tool point, else on the base's centre.
-        direction: in the world, (3,); horizontal on the base.
-    """
-
-    start: float
-    end: float
-    hand: bool
-    direction: FloatArray
+    start: float  # when it begins [s]
+    end: float  # when it ends [s]
+    hand: bool  # whether it acts at the tool point, else on the base's centre
+    direction: FloatArray  # in the world, (3,); horizontal on the base
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""

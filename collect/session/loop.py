@@ -82,12 +82,9 @@ class EpisodeLoop:
         controller: completes the intent.
         control_period: of the controller [s]; the robot's by default.
         disturbances: what acts on the robot from outside.
-
-    Attributes:
-        now: where the episode that has begun stands.
     """
 
-    now: Moment
+    now: Moment  # where the episode that has begun stands
 
     def __init__(
         self,

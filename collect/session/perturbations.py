@@ -20,17 +20,13 @@ _WORDS = {"push": "pushed", "shift": "shifted", "delay": "delayed"}
 
 @dataclass(frozen=True)
 class Perturbation:
-    """How much an episode is disturbed, each way; 0 is not at all.
-
-    Attributes:
-        push: strength of the pushes on base and hand; 1 is that of `collect/session/disturbances.py`.
-        shift: how far from the demonstrations' start the robot begins at most [m, rad].
-        delay: control periods by which observations come late.
-    """
+    """How much an episode is disturbed, each way; 0 is not at all."""
 
     push: Annotated[float, Meta(ge=0, le=10)] = 0.0
+    """Strength of the pushes on base and hand; 1 is that of `collect/session/disturbances.py`."""
     shift: Annotated[float, Meta(ge=0, le=2)] = 0.0
-    delay: Annotated[int, Meta(ge=0, le=100)] = 0
+    """How far from the demonstrations' start the robot begins at most [m, rad]."""
+    delay: Annotated[int, Meta(ge=0, le=100)] = 0  # control periods by which observations come late
 
     def __post_init__(self) -> None:
         """Check the sizes."""

@@ -41,13 +41,9 @@ def episode_of(path: Path) -> int | None:
 
 @dataclass(frozen=True)
 class Layout:
-    """The paths of one dataset.
+    """The paths of one dataset."""
 
-    Attributes:
-        root: The dataset's folder.
-    """
-
-    root: Path
+    root: Path  # The dataset's folder
 
     def data(self, episode: int) -> Path:
         """Return the parquet with the rows of an episode."""

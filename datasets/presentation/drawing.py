@@ -24,17 +24,11 @@ INK, GREY, FAINT = "#1d2733", "#8a94a0", "#e3e7ec"
 
 @dataclass(frozen=True)
 class Panel:
-    """A figure of one pair of axes. What it is called stands beside it in the page, which breaks lines.
+    """A figure of one pair of axes. What it is called stands beside it in the page, which breaks lines."""
 
-    Attributes:
-        title: What it shows.
-        figure: Of matplotlib, without a title.
-        note: How to read it.
-    """
-
-    title: str
-    figure: Any
-    note: str = ""
+    title: str  # What it shows
+    figure: Any  # Of matplotlib, without a title
+    note: str = ""  # How to read it
 
 
 def short(label: str, most: int) -> str:

@@ -18,19 +18,12 @@ _GAP = 2  # between two columns
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table.
+    """A cell of a table."""
 
-    Attributes:
-        text: What it says.
-        look: A class of the style: `detected`, `quiet` or ""; only of HTML.
-        note: Shown when pointed at; only of HTML.
-        below: A second line, smaller.
-    """
-
-    text: str
-    look: str = ""
-    note: str = ""
-    below: str = ""
+    text: str  # What it says
+    look: str = ""  # A class of the style: `detected`, `quiet` or ""; only of HTML
+    note: str = ""  # Shown when pointed at; only of HTML
+    below: str = ""  # A second line, smaller
 
     def __str__(self) -> str:
         return "\n".join(map(printable, filter(None, (self.text, self.below))))
@@ -42,18 +35,12 @@ class Table:
 
     On a terminal lines break between words and nothing is cut off: what does not fit side by side follows
     below, the first column once more beside it.
-
-    Attributes:
-        headings: of the columns; a unit in brackets is text like the rest.
-        rows: one cell a column each, a text or more than that.
-        title: above it.
-        caption: below it.
     """
 
-    headings: Sequence[str]
-    rows: Sequence[Sequence[Cell | str]]
-    title: str = ""
-    caption: str = ""
+    headings: Sequence[str]  # of the columns; a unit in brackets is text like the rest
+    rows: Sequence[Sequence[Cell | str]]  # one cell a column each, a text or more than that
+    title: str = ""  # above it
+    caption: str = ""  # below it
 
     def __rich_console__(
         self, console: Console, options: ConsoleOptions

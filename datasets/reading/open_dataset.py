@@ -15,17 +15,11 @@ from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_in
 
 @dataclass(frozen=True)
 class OpenDataset:
-    """A dataset.
+    """A dataset."""
 
-    Attributes:
-        info: What it is.
-        rows: Lines of metadata of all episodes, in order.
-        files: Its data files that were read last.
-    """
-
-    info: DatasetInfo
-    rows: Sequence[dict[str, Any]]
-    files: DataFiles
+    info: DatasetInfo  # What it is
+    rows: Sequence[dict[str, Any]]  # Lines of metadata of all episodes, in order
+    files: DataFiles  # Its data files that were read last
 
     def row(self, episode: int) -> dict[str, Any]:
         """Return the line of metadata of an episode."""

@@ -19,60 +19,36 @@ MOST = 1e6  # [m/s, rad/s, …] what any other number is cut to
 
 @dataclass(frozen=True)
 class Frame:
-    """One control period: what was observed, asked, commanded, and how the controller fared.
+    """One control period: what was observed, asked, commanded, and how the controller fared."""
 
-    Attributes:
-        state: the robot as observed, (s,); `observation.state`.
-        environment: the task as observed, (e,); `observation.environment_state`.
-        images: pictures by camera, (height, width, 3) uint8 each.
-        intent: what the operator asked for.
-        action: what was sent to the robot: velocities at the end of the period and the gripper, (n + 1,).
-        command: what the controller asked for, (n + 1,); the robot's own limits may have cut it.
-        diagnostics: of the controller.
-        contacts: forbidden contacts in the period.
-        success: whether the task is done at the end of the period.
-        done: whether the episode ends with it.
-        wall_clock: wall time since the episode began [s].
-        number: its place in the episode; after an undo it has been there before.
-        safe: how many frames, from the first on, no undo will take back.
-        undos: how often the operator has gone back in this episode.
-        plan: where the controller leads the robot from here; shown, not recorded.
-        commanded: wall time since the episode began at which the command was there [s]; shown, not recorded.
-    """
-
-    state: FloatArray
-    environment: FloatArray
-    images: dict[str, np.ndarray]
-    intent: Intent
+    state: FloatArray  # the robot as observed, (s,); `observation.state`
+    environment: FloatArray  # the task as observed, (e,); `observation.environment_state`
+    images: dict[str, np.ndarray]  # pictures by camera, (height, width, 3) uint8 each
+    intent: Intent  # what the operator asked for
     action: FloatArray
-    command: FloatArray
-    diagnostics: Diagnostics
-    contacts: int
-    success: bool
-    done: bool
-    wall_clock: float
-    number: int
-    safe: int = sys.maxsize
-    undos: int = 0
-    plan: Trajectory | None = None
+    """What was sent to the robot: velocities at the end of the period and the gripper, (n + 1,)."""
+    command: FloatArray  # what the controller asked for, (n + 1,); the robot's own limits may have cut it
+    diagnostics: Diagnostics  # of the controller
+    contacts: int  # forbidden contacts in the period
+    success: bool  # whether the task is done at the end of the period
+    done: bool  # whether the episode ends with it
+    wall_clock: float  # wall time since the episode began [s]
+    number: int  # its place in the episode; after an undo it has been there before
+    safe: int = sys.maxsize  # how many frames, from the first on, no undo will take back
+    undos: int = 0  # how often the operator has gone back in this episode
+    plan: Trajectory | None = None  # where the controller leads the robot from here; shown, not recorded
     commanded: float = 0.0
+    """Wall time since the episode began at which the command was there [s]; shown, not recorded."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of what is recorded of every moment.
+    """A column of what is recorded of every moment."""
 
-    Attributes:
-        name: of the column.
-        dtype: of its numbers.
-        value: what a frame has in it.
-        parts: which names its numbers have; none for a single one.
-    """
-
-    name: str
-    dtype: str
-    value: Callable[[Frame], Any]
-    parts: str = ""
+    name: str  # of the column
+    dtype: str  # of its numbers
+    value: Callable[[Frame], Any]  # what a frame has in it
+    parts: str = ""  # which names its numbers have; none for a single one
 
 
 COLUMNS = (

@@ -91,19 +91,12 @@ def difference_of_means(first: FloatArray, second: FloatArray, axis: int) -> Flo
 
 @dataclass(frozen=True)
 class Run:
-    """The rollouts of one trained policy.
+    """The rollouts of one trained policy."""
 
-    Attributes:
-        draw: Which draw of the dataset it was trained on.
-        training_seed: Of its training.
-        seeds: Of the rollouts, `(R,)`, rising.
-        values: Success (0 or 1) or another outcome of each, `(R,)`.
-    """
-
-    draw: int
-    training_seed: int
-    seeds: tuple[int, ...]
-    values: FloatArray
+    draw: int  # Which draw of the dataset it was trained on
+    training_seed: int  # Of its training
+    seeds: tuple[int, ...]  # Of the rollouts, `(R,)`, rising
+    values: FloatArray  # Success (0 or 1) or another outcome of each, `(R,)`
 
 
 def resample_runs(conditions: Sequence[Sequence[Run]], rng: np.random.Generator) -> list[FloatArray]:

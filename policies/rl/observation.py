@@ -18,25 +18,15 @@ RigidPose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3)
 
 @dataclass(frozen=True)
 class TrackingSituation:
-    """What an observation is made of; poses and twist in the world frame.
+    """What an observation is made of; poses and twist in the world frame."""
 
-    Attributes:
-        q: generalised coordinates, planar base first, (n,).
-        start: base coordinates at the beginning of the episode, (3,).
-        twist: commanded tool twist, world-aligned, (6,) [m/s, rad/s].
-        current: pose of the tool.
-        desired: where the commands so far would have brought it.
-        goal: where they lead.
-        previous: action before, (3,).
-    """
-
-    q: FloatArray
-    start: FloatArray
-    twist: FloatArray
-    current: RigidPose
-    desired: RigidPose
-    goal: RigidPose
-    previous: FloatArray
+    q: FloatArray  # generalised coordinates, planar base first, (n,)
+    start: FloatArray  # base coordinates at the beginning of the episode, (3,)
+    twist: FloatArray  # commanded tool twist, world-aligned, (6,) [m/s, rad/s]
+    current: RigidPose  # pose of the tool
+    desired: RigidPose  # where the commands so far would have brought it
+    goal: RigidPose  # where they lead
+    previous: FloatArray  # action before, (3,)
 
 
 def check_robot(model: RobotModel) -> None:

@@ -20,15 +20,10 @@ SHIPPED = Path(__file__).parent / "actor"  # the actor that comes with Handrail,
 
 @dataclass(frozen=True)
 class Actor:
-    """The mean action `tanh(W_k relu(… relu(W_1 o + b_1) …) + b_k)` of a soft actor-critic policy.
+    """The mean action `tanh(W_k relu(… relu(W_1 o + b_1) …) + b_k)` of a soft actor-critic policy."""
 
-    Attributes:
-        weights: one matrix a layer, (out, in).
-        biases: one vector a layer, (out,).
-    """
-
-    weights: tuple[FloatArray, ...]
-    biases: tuple[FloatArray, ...]
+    weights: tuple[FloatArray, ...]  # one matrix a layer, (out, in)
+    biases: tuple[FloatArray, ...]  # one vector a layer, (out,)
 
     def __post_init__(self) -> None:
         """Copy the arrays, make them read-only, and check that they fit."""

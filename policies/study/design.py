@@ -141,11 +141,7 @@ class Robustness:
 
 @dataclass(frozen=True)
 class StudyDesign:
-    """A whole study, called after its file; its settings are explained above.
-
-    Attributes:
-        digest: of what its file says, comments left out; "" where it comes from no file.
-    """
+    """A whole study, called after its file; its settings are explained above."""
 
     name: str
     modes: tuple[str, ...]
@@ -161,7 +157,7 @@ class StudyDesign:
     beside: Beside | None = None
     pictures: Pictures | None = None
     robustness: Robustness | None = None
-    digest: str = ""
+    digest: str = ""  # of what its file says, comments left out; "" where it comes from no file
 
     def check(self) -> None:
         """Check names, and how the settings fit each other; `check_jobs` checks the settings of its jobs."""

@@ -14,17 +14,11 @@ _HERE = "handrail.scripts.bench"
 
 @dataclass(frozen=True)
 class Bench:
-    """One thing to measure.
+    """One thing to measure."""
 
-    Attributes:
-        help: one line.
-        config: `module:name` of its settings; light to import.
-        main: `module:name` of `(config) -> exit code`.
-    """
-
-    help: str
-    config: str
-    main: str
+    help: str  # one line
+    config: str  # `module:name` of its settings; light to import
+    main: str  # `module:name` of `(config) -> exit code`
 
     @property
     def settings(self) -> type[Any]:

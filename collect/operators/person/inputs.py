@@ -7,23 +7,15 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Input:
-    """Where the inputs are.
+    """Where the inputs are."""
 
-    Attributes:
-        on: whether somebody holds the dead-man, and is there: a page seen, a device connected.
-        device: what is moved.
-        grip: whether the gripper shall be closed.
-        axes: deflection of each channel, from −1 to 1, (m,).
-        view: from where the person looks, about the vertical [rad].
-        targets: where the arm's joints shall go, as a leader arm or sliders say it [rad]; empty while let go.
-    """
-
-    on: bool
-    device: str
-    grip: bool
-    axes: tuple[float, ...]
-    view: float = 0.0
+    on: bool  # whether somebody holds the dead-man, and is there: a page seen, a device connected
+    device: str  # what is moved
+    grip: bool  # whether the gripper shall be closed
+    axes: tuple[float, ...]  # deflection of each channel, from −1 to 1, (m,)
+    view: float = 0.0  # from where the person looks, about the vertical [rad]
     targets: tuple[float, ...] = ()
+    """Where the arm's joints shall go, as a leader arm or sliders say it [rad]; empty while let go."""
 
     @property
     def is_let_go(self) -> bool:

@@ -23,25 +23,15 @@ HAND_FRAMES: tuple[HandFrame, ...] = ("world", "base", "tool", "view")
 
 @dataclass(frozen=True)
 class Setting:
-    """What the operator has chosen.
+    """What the operator has chosen."""
 
-    Attributes:
-        mode: teleop mode.
-        focus: what they attend to, in a mode that makes a difference.
-        frame: in which the hand's deflections are meant; `view` is as the person looks.
-        speed: share of full stick.
-        locked: joints that shall stand still, by index.
-        axis: the one that is steered, in a mode of one axis at a time; −1 before the first.
-        switches: how often mode, focus, locks or that axis have changed in this episode.
-    """
-
-    mode: TeleopMode
-    focus: Focus = "hand"
-    frame: HandFrame = "view"
-    speed: float = 0.6
-    locked: tuple[int, ...] = ()
-    axis: int = -1
-    switches: int = 0
+    mode: TeleopMode  # teleop mode
+    focus: Focus = "hand"  # what they attend to, in a mode that makes a difference
+    frame: HandFrame = "view"  # in which the hand's deflections are meant; `view` is as the person looks
+    speed: float = 0.6  # share of full stick
+    locked: tuple[int, ...] = ()  # joints that shall stand still, by index
+    axis: int = -1  # the one that is steered, in a mode of one axis at a time; −1 before the first
+    switches: int = 0  # how often mode, focus, locks or that axis have changed in this episode
 
     @property
     def is_single(self) -> bool:

@@ -12,38 +12,29 @@ _WIDEST = 2.0  # a person is at most this many standard deviations from the aver
 
 @dataclass(frozen=True)
 class HumanSettings:
-    """How human the operator is; all zero is a perfect one.
+    """How human the operator is; all zero is a perfect one."""
 
-    Attributes:
-        delay: from perception to hand [s]; 0.14–0.25 in people.
-        refractory: shortest time between two corrections [s]; 0.35 for a velocity stick.
-        threshold: change of the wanted command, relative to full stick, below which the hand stays; of
-            joints, as that moves the tool (`InputMap.fine`).
-        noise: standard deviation of the signal-dependent noise over |command|; about 0.1.
-        drift: standard deviation of the drift over full stick, while the stick is deflected; likewise.
-        correlation: how fast noise, drift and misjudgement wander, time constant [s].
-        switch_time: hands off the stick while changing to other inputs [s]; makes switching 17.4 % of the
-            time when steering joint by joint.
-        movement: of the hand from one deflection to the next, minimum jerk [s].
-        misjudgement: standard deviation of a distance to go, or to turn, as it is seen, over that distance.
-        persons: how much people differ, standard deviation of the logarithm of each number above.
-        moods: the same for the same person from episode to episode.
-        briskness: how briskly they steer, over what the device's gains say: a throughput of
-            `briskness · gain / ln 2` [bit/s] (`Gains`); no weakness, so noise, persons and moods leave it.
-    """
-
-    delay: NonNegative = 0.2
-    refractory: NonNegative = 0.35
+    delay: NonNegative = 0.2  # from perception to hand [s]; 0.14–0.25 in people
+    refractory: NonNegative = 0.35  # shortest time between two corrections [s]; 0.35 for a velocity stick
     threshold: NonNegative = 0.03
-    noise: NonNegative = 0.1
+    """Change of the wanted command, relative to full stick, below which the hand stays; of joints, as that
+    moves the tool (`InputMap.fine`)."""
+    noise: NonNegative = 0.1  # standard deviation of the signal-dependent noise over |command|; about 0.1
     drift: NonNegative = 0.02
-    correlation: NonNegative = 0.5
+    """Standard deviation of the drift over full stick, while the stick is deflected; likewise."""
+    correlation: NonNegative = 0.5  # how fast noise, drift and misjudgement wander, time constant [s]
     switch_time: NonNegative = 0.3
-    movement: NonNegative = 0.15
+    """Hands off the stick while changing to other inputs [s]; makes switching 17.4 % of the time when
+    steering joint by joint."""
+    movement: NonNegative = 0.15  # of the hand from one deflection to the next, minimum jerk [s]
     misjudgement: NonNegative = 0.05
+    """Standard deviation of a distance to go, or to turn, as it is seen, over that distance."""
     persons: NonNegative = 0.15
-    moods: NonNegative = 0.08
+    """How much people differ, standard deviation of the logarithm of each number above."""
+    moods: NonNegative = 0.08  # the same for the same person from episode to episode
     briskness: Positive = 1.0
+    """How briskly they steer, over what the device's gains say: a throughput of `briskness · gain / ln 2`
+    [bit/s] (`Gains`); no weakness, so noise, persons and moods leave it."""
 
     def __post_init__(self) -> None:
         """Check the numbers."""

@@ -54,20 +54,13 @@ class StraightPlanner:
     """Moves the tool on a straight line with spherical interpolation, open loop, at a constant twist.
 
     `p(t) = p_0 + v t h`, `R(t) = exp(ω t h) R_0` for `steps` steps of h = 0.03 s; at rest from then on.
-
-    Attributes:
-        start_position: where it begins [m], (3,).
-        start_rotation: the same, world from tool, (3, 3).
-        goal: where it ends.
-        velocity: (v, ω), world-aligned at the tool [m/s, rad/s], (6,).
-        steps: how many it takes.
     """
 
-    start_position: FloatArray
-    start_rotation: FloatArray
-    goal: Pose
-    velocity: FloatArray
-    steps: int
+    start_position: FloatArray  # where it begins [m], (3,)
+    start_rotation: FloatArray  # the same, world from tool, (3, 3)
+    goal: Pose  # where it ends
+    velocity: FloatArray  # (v, ω), world-aligned at the tool [m/s, rad/s], (6,)
+    steps: int  # how many it takes
 
     @classmethod
     def plan(

@@ -12,21 +12,13 @@ _STAYS = 0.8  # of all updates, before the rate falls
 
 @dataclass(frozen=True)
 class Plateau:
-    """When a loss is flat, and what follows from that.
+    """When a loss is flat, and what follows from that."""
 
-    Attributes:
-        losses: on held-out episodes by update; grows while the training goes on.
-        patience: measurements that a loss may take to become better.
-        improvement: share by which it has to.
-        most: updates of the whole training.
-        warmup: updates in which the learning rate rises.
-    """
-
-    losses: Mapping[int, float]
-    patience: int
-    improvement: float
-    most: int
-    warmup: int
+    losses: Mapping[int, float]  # on held-out episodes by update; grows while the training goes on
+    patience: int  # measurements that a loss may take to become better
+    improvement: float  # share by which it has to
+    most: int  # updates of the whole training
+    warmup: int  # updates in which the learning rate rises
 
     @property
     def flat(self) -> int | None:

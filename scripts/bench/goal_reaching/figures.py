@@ -177,15 +177,10 @@ _REST = 10  # pictures after the end
 
 @dataclass(frozen=True)
 class Example:
-    """Some runs under the same conditions.
+    """Some runs under the same conditions."""
 
-    Attributes:
-        conditions: goal and obstacles.
-        runs: who, and what happened.
-    """
-
-    conditions: Conditions
-    runs: Sequence[tuple[str, Trace]]
+    conditions: Conditions  # goal and obstacles
+    runs: Sequence[tuple[str, Trace]]  # who, and what happened
 
     def film(self, path: Path) -> None:
         """Write them as a video, side by side."""

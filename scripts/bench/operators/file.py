@@ -73,37 +73,21 @@ _UNNAMED = {"robot": "ridgeback_ur10"}  # of files from before there was a choic
 
 @dataclass(frozen=True)
 class OperatorTrial:
-    """How one episode went.
+    """How one episode went."""
 
-    Attributes:
-        task: what was done.
-        mode: in which teleop mode.
-        episode: its number; scenes are the same in all modes.
-        person: who steered.
-        success: whether the task was done.
-        failure_reason: why not.
-        seconds: simulated time [s].
-        frames: control periods.
-        contacts: forbidden contacts that began; in files that name no robot, control periods with one.
-        smallest_distance: signed, tool against work surfaces left out [m].
-        brakes: updates in which the controller braked the robot.
-        switches: how often the operator changed to other channels.
-        switching: time for which their hands were away from the input meanwhile [s].
-    """
-
-    task: str
-    mode: str
-    episode: int
-    person: int
-    success: bool
-    failure_reason: str
-    seconds: float
-    frames: int
-    contacts: int
-    smallest_distance: float
-    brakes: int
-    switches: int
-    switching: float
+    task: str  # what was done
+    mode: str  # in which teleop mode
+    episode: int  # its number; scenes are the same in all modes
+    person: int  # who steered
+    success: bool  # whether the task was done
+    failure_reason: str  # why not
+    seconds: float  # simulated time [s]
+    frames: int  # control periods
+    contacts: int  # forbidden contacts that began; in files that name no robot, control periods with one
+    smallest_distance: float  # signed, tool against work surfaces left out [m]
+    brakes: int  # updates in which the controller braked the robot
+    switches: int  # how often the operator changed to other channels
+    switching: float  # time for which their hands were away from the input meanwhile [s]
 
 
 class TrialsFile:

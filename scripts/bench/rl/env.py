@@ -50,19 +50,12 @@ _FAILURES = 20  # steps off the planner's pose, by more than a success allows, t
 
 @dataclass(frozen=True)
 class Reward:
-    """`s(−½[(d/0.1)² + (r/0.05)²] − w_Δ‖a − a⁻‖² − w_a‖a‖²)`, d and r against the planner's pose.
+    """`s(−½[(d/0.1)² + (r/0.05)²] − w_Δ‖a − a⁻‖² − w_a‖a‖²)`, d and r against the planner's pose."""
 
-    Attributes:
-        scale: s.
-        change: w_Δ.
-        size: w_a.
-        failure: s times this is subtracted when an episode is given up.
-    """
-
-    scale: float = 1.0
-    change: float = 0.05
-    size: float = 0.05
-    failure: float = 0.0
+    scale: float = 1.0  # s
+    change: float = 0.05  # w_Δ
+    size: float = 0.05  # w_a
+    failure: float = 0.0  # s times this is subtracted when an episode is given up
 
     def value(self, d: float, r: float, action: FloatArray, previous: FloatArray) -> float:
         """Return the reward of a step that ended d [m] and r off the planner's pose."""

@@ -29,21 +29,13 @@ _MODES = (("ee",), ("base",), ("base", "ee"), ("joint",))
 
 @dataclass(frozen=True)
 class SpeedCase:
-    """What one loop measures.
+    """What one loop measures."""
 
-    Attributes:
-        name: unique.
-        robot: its description.
-        own: which of the robot's own pairs are watched: `all`, `few` or `none`.
-        obstacles: how many.
-        horizon: stages.
-    """
-
-    name: str
-    own: str = "all"
-    obstacles: int = 0
-    horizon: int = 10
-    robot: str = "ridgeback_ur10"
+    name: str  # unique
+    own: str = "all"  # which of the robot's own pairs are watched: `all`, `few` or `none`
+    obstacles: int = 0  # how many
+    horizon: int = 10  # stages
+    robot: str = "ridgeback_ur10"  # its description
 
 
 CASES = (
