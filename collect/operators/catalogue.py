@@ -20,11 +20,11 @@ class OperatorSpec:
     """Whether it is someone now at this computer: in real time, free to change the mode."""
 
 
-_DEVICES = "handrail.collect.devices.open_devices:open_device"
+_DEVICES = "handrail.collect.devices.open_devices"
 
 
-def _device(name: str, help: str) -> OperatorSpec:
-    return OperatorSpec(name, _DEVICES, help, interactive=True)
+def _device(name: str, help: str, opened: str = "open_device") -> OperatorSpec:
+    return OperatorSpec(name, f"{_DEVICES}:{opened}", help, interactive=True)
 
 
 OPERATORS = Registry(
@@ -45,6 +45,6 @@ OPERATORS = Registry(
         _device("gamepad", "a person with a gamepad at this computer"),
         _device("spacemouse", "a person with a SpaceMouse"),
         _device("keyboard", "a person with the keys of this terminal"),
-        _device("leader_arm", "a person with a leader arm of LeRobot's (--teleop.type)"),
+        _device("leader_arm", "a person with a leader arm of LeRobot's (--teleop.type)", "open_leader_arm"),
     ),
 )

@@ -1,7 +1,7 @@
 """Builds the compiled core: a shared library of the C beside this page, named after a hash of it.
 
 It is the package's build backend (PEP 517): the library is built before the package, with the system's C
-compiler; where there is none, pip installs zig's first. It needs nothing but the standard library until then.
+compiler; where there is none, zig's is installed first. It needs nothing but the standard library until then.
 """
 
 import hashlib
@@ -16,16 +16,16 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-_FOLDER = Path(__file__).resolve().parent
+FOLDER = Path(__file__).resolve().parent
 _FLAGS = ("-O3", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off")
 
 
 def library() -> Path:
     """Return the path of the library that belongs to the sources, built or not."""
     digest = hashlib.sha256(repr((_FLAGS, sys.platform, platform.machine())).encode())
-    for source in sorted([*_FOLDER.glob("*.c"), *_FOLDER.glob("*.h")]):
+    for source in sorted([*FOLDER.glob("*.c"), *FOLDER.glob("*.h")]):
         digest.update(source.read_bytes())
-    return _FOLDER / f"core-{digest.hexdigest()[:16]}.so"
+    return FOLDER / f"core-{digest.hexdigest()[:16]}.so"
 
 
 def build() -> Path:
@@ -38,9 +38,9 @@ def build() -> Path:
         raise OSError(
             "the compiled core: expected a C compiler (cc, gcc or clang) or the package ziglang, found none"
         )
-    with tempfile.TemporaryDirectory(dir=_FOLDER) as folder:
+    with tempfile.TemporaryDirectory(dir=FOLDER) as folder:
         fresh = Path(folder) / built.name
-        sources = map(str, sorted(_FOLDER.glob("*.c")))
+        sources = map(str, sorted(FOLDER.glob("*.c")))
         done = subprocess.run(
             [*compiler, *_FLAGS, *sources, "-o", str(fresh), "-lm"],
             capture_output=True,
@@ -50,7 +50,7 @@ def build() -> Path:
         if done.returncode:
             raise OSError(f"the compiled core: {compiler[0]} failed: {' '.join(done.stderr.split())[:300]}")
         os.replace(fresh, built)
-    for old in _FOLDER.glob("core-*.so"):
+    for old in FOLDER.glob("core-*.so"):
         if old != built:
             old.unlink(missing_ok=True)
     return built

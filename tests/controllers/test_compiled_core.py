@@ -42,7 +42,7 @@ def test_other_sources_are_another_library(tmp_path, monkeypatch):
     """A clone that is updated is built anew: a library of other sources is never loaded."""
     before = building.library()
     (tmp_path / "core.c").write_text("int one(void) { return 1; }")
-    monkeypatch.setattr(building, "_FOLDER", tmp_path)
+    monkeypatch.setattr(building, "FOLDER", tmp_path)
     first = building.library()
     (tmp_path / "core.c").write_text("int one(void) { return 2; }")
     assert len({before, first, building.library()}) == 3
@@ -50,7 +50,7 @@ def test_other_sources_are_another_library(tmp_path, monkeypatch):
 
 def test_without_a_compiler_pip_is_asked_for_one(tmp_path, monkeypatch):
     (tmp_path / "core.c").write_text("int one(void) { return 1; }")
-    monkeypatch.setattr(building, "_FOLDER", tmp_path)
+    monkeypatch.setattr(building, "FOLDER", tmp_path)
     monkeypatch.setenv("PATH", os.devnull)
     assert building.get_requires_for_build_wheel() == ["ziglang"]
     with pytest.raises(OSError, match=r"expected a C compiler \(cc, gcc or clang\) or the package ziglang"):

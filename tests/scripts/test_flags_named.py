@@ -30,8 +30,9 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "ray start": "--head --port --address --disable-usage-stats",
 }
 GROUPS = {"--human", "--cockpit", "--teleop", "--client", "--dataset"}  # of flags: --human.*
-# what starts Chromium and the like
+# what starts Chromium, builds a wheel and the like
 FOREIGN = {
+    "controllers/core/building.py",
     "collect/session/viewer.py",
     "scripts/bench/latency/measure.py",
 }
