@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 
 # imported at the top of modules that only an extra's users import
-EXTRAS = ("accelerate", "stable_baselines3", "mink", "uvicorn", "starlette", "websockets", "ray")
+EXTRAS = ("accelerate", "stable_baselines3", "mink", "uvicorn", "starlette", "websockets", "cryptography", "ray")
 FOLDERS = ("collect", "controllers", "datasets", "policies", "scripts")
 BENCHES = Path("scripts/bench")  # of a clone alone
 
