@@ -12,7 +12,8 @@ from importlib import metadata
 from pathlib import Path
 
 # imported at the top of modules that only an extra's users import
-EXTRAS = ("accelerate", "stable_baselines3", "mink", "uvicorn", "starlette", "websockets", "cryptography", "ray")
+EXTRAS = ("accelerate", "stable_baselines3", "mink", "ray", "uvicorn", "starlette", "websockets")
+EXTRAS += ("cryptography",)
 FOLDERS = ("collect", "controllers", "datasets", "policies", "scripts")
 BENCHES = Path("scripts/bench")  # of a clone alone
 
