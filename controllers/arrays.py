@@ -18,7 +18,7 @@ _WORDS = {"f": "real numbers", "i": "integers", "b": "True or False"}
 
 
 def frozen(values: ArrayLike, dtype: Any = np.float64, what: str = "an array") -> NDArray[Any]:
-    """Return a read-only copy of the values.
+    """Return a read-only copy of the values; these themselves where they are read-only and own their memory.
 
     Args:
         values: numbers; truth values where `dtype` is bool.
@@ -26,6 +26,8 @@ def frozen(values: ArrayLike, dtype: Any = np.float64, what: str = "an array") -
         what: they are, for the message.
     """
     if type(values) is np.ndarray and values.dtype is _FLOAT and dtype is np.float64:
+        if values.base is None and not values.flags.writeable:
+            return values
         array = values.copy()  # what nearly all are, and many in an update
     else:
         if not (isinstance(values, np.ndarray) and values.dtype == dtype):

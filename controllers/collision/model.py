@@ -28,6 +28,7 @@ class CollisionModel:
     Attributes:
         pairs: names of the two shapes of each pair, (P,) of (str, str).
         work: which pairs are a tool shape against a work surface, (P,).
+        apart_and_work: rows of the other pairs, and of those.
         largest_margin: the largest margin that a pair can keep [m], (P,).
         held: rows of the pairs with something that the hand holds, (H,).
         kinds: whether a pair is OWN, STANDING or MOVING (slacks.py), (P,).
@@ -40,6 +41,7 @@ class CollisionModel:
         self._kept = _kept(obstacles)
         self.pairs = self._shapes.names
         self.work = self._shapes.work
+        self.apart_and_work = np.flatnonzero(~self.work), np.flatnonzero(self.work)
         self.largest_margin = self._shapes.largest_margin
         self.held = self._shapes.held
         self.memory = self._shapes.memory

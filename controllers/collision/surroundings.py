@@ -74,10 +74,10 @@ class Surroundings:
 
     def smallest(self, distances: FloatArray) -> tuple[float, float]:
         """Return the smallest distance, tools at work surfaces left out, and the smallest of those [m]."""
-        work = self.collision.work
-        if not work.any():
+        apart, work = self.collision.apart_and_work
+        if not len(work):
             return float(distances.min(initial=np.inf)), np.inf
-        return float(distances[~work].min(initial=np.inf)), float(distances[work].min(initial=np.inf))
+        return float(distances[apart].min(initial=np.inf)), float(distances[work].min())
 
 
 def _wanted(collision: CollisionModel, margin: float, work_margin: float) -> FloatArray:

@@ -155,6 +155,12 @@ void stop_violation(Scene *scene, const double *q, const double *v, double delay
                     const double *start, const double *now, const double *least, const double *lower,
                     const double *upper, const double *a_max, double *violation);
 
+/* trajectory.c */
+void interpolate(const double *velocities, int64_t count, int64_t n, const double *knots, int64_t number, double *out);
+void mean_accelerations(const double *velocities, int64_t count, int64_t n, double first, double dt, int64_t stages,
+                        double *out);
+int64_t stop_velocities(const double *velocity, int64_t n, const double *a_max, double dt, int64_t room, double *out);
+
 /* rotation.c */
 int64_t quaternion_of(const double *rotation, double *quaternion);
 void vector_of(const double *quaternion, double *vector);

@@ -28,17 +28,18 @@ class State:
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
-        if self.commanded is None:
-            object.__setattr__(self, "commanded", self.v)
-        for name in ("q", "v", "commanded"):
-            object.__setattr__(self, name, frozen(getattr(self, name), what=f"{name} of a state"))
-        expected = self.q if self.expected is None else frozen(self.expected, what="expected of a state")
-        object.__setattr__(self, "expected", expected)
+        for name, usual in (("q", None), ("v", None), ("commanded", "v"), ("expected", "q")):
+            values = getattr(self, name)
+            known = values is not None or usual is None
+            array = frozen(values, what=f"{name} of a state") if known else getattr(self, usual)
+            object.__setattr__(self, name, array)
         object.__setattr__(self, "time", real(self.time, "time of a state"))
 
     def is_of(self, size: int) -> bool:
         """Whether all of it but the time are finite numbers for a robot with `size` coordinates."""
-        return all(_known(each, size) for each in (self.q, self.v, self.commanded, self.expected))
+        told = self.commanded is self.v or _known(self.commanded, size)
+        near = self.expected is self.q or _known(self.expected, size)
+        return told and near and _known(self.q, size) and _known(self.v, size)
 
     def sent(self, limits: Limits) -> FloatArray:
         """Return the velocity with which every command begins, (n,): the one sent last, within the limits.

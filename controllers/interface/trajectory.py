@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.core.library import functions
 
 _ROUNDING = 1e-5  # of a time, relative: no later than the last knot
 
@@ -37,8 +38,9 @@ class Trajectory:
 
     def after(self, time: float) -> "Trajectory":
         """Return what is left of it `time` [s] from now: the same curve, without knots long past."""
-        whole, elapsed = self._past(time)
-        return Trajectory(self.velocities[whole:], self.dt, elapsed)
+        passed = self.elapsed + max(time, 0.0)
+        whole = min(int(passed / self.dt), len(self.velocities) - 2)
+        return Trajectory(self.velocities[whole:], self.dt, passed - whole * self.dt)
 
     def accelerations(self, count: int, time: float = 0.0) -> FloatArray:
         """Return the mean accelerations over intervals dt, (count, n); zero after the end.
@@ -47,8 +49,9 @@ class Trajectory:
             count: of intervals.
             time: when the first one begins, from now [s].
         """
-        whole, elapsed = self._past(time)
-        return _accelerations(self.velocities[whole:], self.dt, elapsed, count)
+        found, first = np.empty((count, self.velocities.shape[1])), (self.elapsed + max(time, 0.0)) / self.dt
+        functions().mean_accelerations(self.velocities, *self.velocities.shape, first, self.dt, count, found)
+        return found
 
     def path(self, q: FloatArray, samples: int = 1) -> tuple[FloatArray, FloatArray]:
         """Return where it leads from q: positions, (K, n), and their times from now, (K,) [s].
@@ -60,26 +63,7 @@ class Trajectory:
         step = self.dt / samples
         ahead = step * np.arange(samples * (len(self.velocities) - 1) + 1) - self.elapsed
         times = np.append(0.0, ahead[ahead > 0.0])
-        velocities = _interpolated(self.velocities, (times + self.elapsed) / self.dt)
+        knots, velocities = (times + self.elapsed) / self.dt, np.empty((len(times), len(q)))
+        functions().interpolate(self.velocities, *self.velocities.shape, knots, len(knots), velocities)
         moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
         return np.vstack([q, q + np.cumsum(moves, axis=0)]), times
-
-    def _past(self, time: float) -> tuple[int, float]:
-        """Return how many intervals are over `time` [s] from now, and how much of the next one [s]."""
-        passed = self.elapsed + max(time, 0.0)
-        whole = min(int(passed / self.dt), len(self.velocities) - 2)
-        return whole, passed - whole * self.dt
-
-
-def _interpolated(velocities: FloatArray, knots: FloatArray) -> FloatArray:
-    """Return velocities at times in units of dt, (K,), the last one held after the end, (K, n)."""
-    last = len(velocities) - 1
-    knots = np.minimum(knots, float(last))
-    index = np.minimum(knots.astype(np.intp), last - 1)
-    weight = (knots - index)[:, None]
-    return (1.0 - weight) * velocities[index] + weight * velocities[index + 1]
-
-
-def _accelerations(velocities: FloatArray, dt: float, elapsed: float, count: int) -> FloatArray:
-    found = _interpolated(velocities, (dt * np.arange(count + 1) + elapsed) / dt)
-    return (found[1:] - found[:-1]) / dt

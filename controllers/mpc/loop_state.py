@@ -55,24 +55,30 @@ class LoopState(NamedTuple):
             return 0.0
         return time - self.time if math.isfinite(time) and time > self.time else self.period
 
-    def following(self, command: Command, time: float, period: float) -> "LoopState":
+    def following(
+        self, command: Command, time: float, period: float, plan: Plan | None, stored: Trajectory
+    ) -> "LoopState":
         """Return the state after a command is sent.
 
         Args:
             command: it.
             time: now, which may be no number [s].
             period: from one command to the next, if it is not known yet [s].
+            plan: that it begins, if it does.
+            stored: the motion that `Backup` may go on with.
         """
-        elapsed, known = self.elapsed(time), math.isfinite(time)
+        elapsed = self.elapsed(time)
+        if not math.isfinite(time):
+            time = self.time + elapsed
         if self.command is not None:
             period = self.period if self.command.is_over(elapsed) else elapsed
-        return self._replace(command=command, time=time if known else self.time + elapsed, period=period)
+        return self._replace(command=command, time=time, period=period, plan=plan, stored=stored)
 
     def guess(self, time: float, horizon: int, size: int) -> FloatArray:
         """Return the accelerations that the robot follows from a time on, (N, n): the warm start."""
         if self.command is None:
             return np.zeros((horizon, size))
         elapsed = self.elapsed(time)
-        on_plan = self.plan is not None and self.stored is not None and not self.stored.is_over(elapsed)
-        followed = Trajectory(self.plan.v, self.command.dt) if on_plan and self.plan else self.command
-        return followed.accelerations(horizon, elapsed)
+        plan, stored = self.command.plan, self.stored
+        on_plan = plan is not None and stored is not None and not stored.is_over(elapsed)
+        return (plan if on_plan else self.command).accelerations(horizon, elapsed)

@@ -42,7 +42,7 @@ class Supervisor:
             start: when the update began [s].
         """
         distances = self._distances(loop, state, plan)
-        if distances is not None:
+        if distances is not None and len(loop.surroundings.collision.held):
             loop = loop._replace(surroundings=loop.surroundings.seen(distances))
         motion, stored, planned = self._motion(loop, state, plan, distances, halt=status in _UNHEARD)
         if plan is not None and not planned:
@@ -51,8 +51,9 @@ class Supervisor:
         gripper = _gripper(loop, intent, status)
         planned_path = Trajectory(plan.v, self.settings.dt) if plan is not None and planned else None
         command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics, planned_path)
-        loop = loop.following(command, state.time, self.settings.dt)
-        return command, loop._replace(plan=plan if planned else None, stored=stored)
+        return command, loop.following(
+            command, state.time, self.settings.dt, plan if planned else None, stored
+        )
 
     def _motion(
         self, loop: LoopState, state: State, plan: Plan | None, distances: FloatArray | None, halt: bool
@@ -89,11 +90,10 @@ class Supervisor:
 
     def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:
         """Return the signed distances now, (P,); None where nobody knows where the robot is."""
-        if not state.is_of(len(self.limiter.limits.velocity)):
-            return None
-        return (
-            loop.surroundings.collision.values(state.expected[None, :])[0] if plan is None else plan.distances
-        )
+        if plan is not None:
+            return plan.distances
+        known = state.is_of(len(self.limiter.limits.velocity))
+        return loop.surroundings.collision.values(state.expected[None, :])[0] if known else None
 
 
 def _gripper(loop: LoopState, intent: Intent, status: Status) -> float:

@@ -1,6 +1,7 @@
 """The masked optimal control problem of one update (the paper's equation 6), as a value."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +11,7 @@ from handrail.controllers.ocp.motion import rollout
 from handrail.controllers.robot.parts import Limits
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(NamedTuple):
     """`min Σ_k ½ ‖r(q_k, v_k, u_k; p) - ref_k‖²_W_k + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)` over N stages.
 
     Dynamics: `v_k = v_{k-1} + dt u_k`, `q_k = q_{k-1} + dt v_{k-1} + ½ dt² u_k`. Hard: `|u| ≤ a_max`.

@@ -1,13 +1,13 @@
 """The last gate before the robot: every velocity command passes it."""
 
-import math
-
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.core.library import Pointer
+from handrail.controllers.core.library import Pointer, functions
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import RobotDescription
 
+_USUAL_STOP = 32  # knots for which there is room at once
 _TOLERANCE = 1e-5  # relative; rounding to float32 is no violation
 
 
@@ -54,11 +54,16 @@ class Limiter:
 
     def to_rest(self, velocities: FloatArray, dt: float) -> FloatArray:
         """Return velocities at knots, (k, n), and the fastest stop from the last one."""
-        last, deceleration = velocities[-1], self.limits.acceleration
-        speed = np.abs(last)
-        steps = max(1, math.ceil(float((speed / deceleration).max()) / dt))
-        times = dt * np.arange(1, steps + 1)[:, None]
-        return np.vstack([velocities, np.sign(last) * np.maximum(speed - deceleration * times, 0.0)])
+        count, n = velocities.shape
+        last = np.ascontiguousarray(velocities[-1], dtype=np.float64)
+        room, needed = -1, _USUAL_STOP
+        while needed > room:
+            room, result = needed, np.empty((count + needed, n))
+            needed = functions().stop_velocities(last, n, self.acceleration, dt, room, result[count:])
+        if needed < 0:
+            raise HandrailError(f"velocity to stop from: expected finite numbers, got {last.tolist()}")
+        result[:count] = velocities
+        return result[: count + needed]
 
     def _braking_range(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         above = np.maximum(self.limits.position_upper - q, 0.0)
