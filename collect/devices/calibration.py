@@ -1,11 +1,9 @@
 """Which joint of a leader arm drives which joint of the robot's arm, which way, and how far."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +11,8 @@ from handrail.collect.teleop_config import LeaderConfig
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import Name, Number, check_names, decoded
-from handrail.datasets.storage.atomic import explained, make_folder, write_whole
+from handrail.datasets.storage.atomic import explained, make_folder
+from handrail.datasets.storage.strict_json import load_json, write_json
 
 _OPEN, _CLOSED = 0.6, 0.4  # of the gripper's way: where it counts as open, and as closed
 
@@ -74,8 +73,7 @@ class LeaderCalibration:
     @property
     def sources(self) -> tuple[str, ...]:
         """Names of the positions that a reading has to have."""
-        handle = (self.gripper.source,) if self.gripper else ()
-        return (*(joint.source for joint in self.joints.values()), *handle)
+        return tuple(each.source for each in (*self.joints.values(), self.gripper) if each)
 
 
 _SO_ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
@@ -100,17 +98,11 @@ def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCal
     Args:
         path: of the file.
         arm: names of the arm's joints.
-        advice: how to make the file.
+        advice: the command that makes the file.
     """
-    if not path.is_file():
-        raise HandrailError(f"leader arm: no calibration for this robot yet; make it once: {advice}")
-    where = f"calibration {path}"
-    try:
-        content: Any = json.loads(path.read_text())
-    except (OSError, ValueError, RecursionError) as error:
-        raise HandrailError(f"{where}: expected JSON; make it anew: {advice}") from error
-    calibration = decoded(content, LeaderCalibration, where)
-    check_names(calibration.joints, dict.fromkeys(arm), f"{where}: joints")
+    what = f"a calibration of the leader arm for this robot, which {advice} makes"
+    calibration = decoded(load_json(path, what), LeaderCalibration, f"calibration {path}")
+    check_names(calibration.joints, dict.fromkeys(arm), f"calibration {path}: joints")
     return calibration
 
 
@@ -118,7 +110,7 @@ def save_calibration(calibration: LeaderCalibration, path: Path) -> None:
     """Write a calibration; a crash leaves the one before."""
     with explained(f"calibration {path}"):
         make_folder(path.parent)
-        write_whole(path, (json.dumps(asdict(calibration), indent=2) + "\n").encode())
+        write_json(path, asdict(calibration))
 
 
 def calibration_file(leader: LeaderConfig, robot: str) -> Path:

@@ -8,10 +8,9 @@ need the same controls are banks: the action `focus` goes from one to the next.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from handrail.collect.devices.device import DeviceInput
-from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.channels import BASE, TOOL
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import check, check_names
@@ -47,10 +46,19 @@ ACTIONS: Mapping[str, str] = {
     "practice": "practice: not recorded",
     "help": "show or hide this help",
 }
-HELD = ("hold", "clutch")  # actions that last as long as the control is down
+HOLD, CLUTCH = "hold", "clutch"  # actions that last as long as the control is down
 _FOLDER = Path(__file__).parent / "maps"
 
 Moves = Mapping[str, tuple[str, int]]  # axis and sign of each control
+
+
+class Steered(NamedTuple):
+    """What is steered now."""
+
+    hand: bool
+    base: bool
+    arm: tuple[str, ...] = ()
+    """Channels of the arm's joints; the section's are counted from the first."""
 
 
 @dataclass(frozen=True)
@@ -65,63 +73,48 @@ class ControlMap:
     def meant(self, said: DeviceInput, presses: Iterable[str], moves: Moves) -> DeviceInput:
         """Return an input in the words of the map: channels instead of axes, actions instead of presses.
 
+        Where no control asks for `hold`, it always holds.
+
         Args:
             said: by the device.
             presses: all since the last time.
             moves: in force now.
         """
         actions = self.actions
-        holds = {actions[name] for name in said.deflections if actions.get(name) in HELD}
-        if "hold" not in actions.values():
-            holds.add("hold")
-        axes: dict[str, float] = {}
-        if "hold" in holds and said.attended:
-            for control, (axis, sign) in moves.items():
-                axes[axis] = axes.get(axis, 0.0) + sign * said.deflections.get(control, 0.0)
-        asked = (actions[name] for name in presses if name in actions)
-        return replace(
-            said,
-            deflections={axis: value for axis, value in axes.items() if value},
-            presses=tuple(action for action in asked if action not in HELD),
-            holds=frozenset(holds) if said.attended else frozenset(holds - {"clutch"}),
-        )
+        down = {actions.get(name) for name in said.deflections}
+        meant = {name: 1.0 for name in (HOLD, CLUTCH) if name in down}
+        if HOLD not in actions.values():
+            meant[HOLD] = 1.0
+        for control, (axis, sign) in moves.items() if HOLD in meant else ():
+            meant[axis] = meant.get(axis, 0.0) + sign * said.deflections.get(control, 0.0)
+        asked = tuple(actions[name] for name in presses if name in actions)
+        return replace(said, deflections=meant, presses=asked)
 
     def only(self, *sections: str) -> "ControlMap":
         """Return it without the moves of other sections."""
         return ControlMap({name: self.moves.get(name, {}) for name in sections}, self.actions)
 
-    def banks(self, hand: bool, base: bool, arm: tuple[str, ...] = ()) -> list[Moves]:
-        """Return the moves that are in force together, one bank or several.
-
-        Args:
-            hand: whether the hand is steered.
-            base: whether the base is.
-            arm: channels of the arm's joints that are steered; the section's are counted from the first.
-        """
-        of = self.moves.get
-        both = "both" if base and of("both") else "hand"
-        parts = [of(both, {}), of("turn", {})] if hand else []
-        parts += self._of_joints(arm)
-        parts += [of("base", {})] if base else []
-        banks: list[dict[str, tuple[str, int]]] = []
-        for part in filter(None, parts):
+    def banks(self, steered: Steered) -> list[Moves]:
+        """Return the moves that are in force together, one bank or several."""
+        of, arm = self.moves.get, steered.arm
+        both = "both" if steered.base and of("both") else "hand"
+        parts = [of(both, {}), of("turn", {})] if steered.hand else []
+        joints = of("joints", {})
+        at_once = len({axis for axis, _ in joints.values()}) or 1
+        for first in range(0, len(arm), at_once):
+            names = dict(zip(SECTIONS["joints"], arm[first : first + at_once], strict=False))
+            parts.append(
+                {name: (names[axis], sign) for name, (axis, sign) in joints.items() if axis in names}
+            )
+        parts += [of("base", {})] if steered.base else []
+        banks: list[dict[str, tuple[str, int]]] = [{}]
+        for part in parts:
             fitting = next((bank for bank in banks if not bank.keys() & part.keys()), None)
             if fitting is None:
                 banks.append(dict(part))
             else:
                 fitting.update(part)
-        return list(banks) or [{}]
-
-    def _of_joints(self, arm: tuple[str, ...]) -> list[Moves]:
-        """Return the moves of the arm's joints, as many at a time as the section has."""
-        section = self.moves.get("joints", {})
-        at_once = len({axis for axis, _ in section.values()})
-        chunks = [arm[first : first + at_once] for first in range(0, len(arm), at_once)] if at_once else []
-        named = [dict(zip(SECTIONS["joints"], chunk, strict=False)) for chunk in chunks]
-        return [
-            {control: (names[axis], sign) for control, (axis, sign) in section.items() if axis in names}
-            for names in named
-        ]
+        return list(banks)
 
 
 def load_map(device: str, controls: Iterable[str], changes: str = "") -> ControlMap:
@@ -138,41 +131,33 @@ def load_map(device: str, controls: Iterable[str], changes: str = "") -> Control
         changed = read_toml(path, "--teleop.map")
         _check(changed, dict.fromkeys(sorted(controls)), f"--teleop.map {path}")
         table = {name: table.get(name, {}) | changed.get(name, {}) for name in {**table, **changed}}
-    actions = {control: action for control, action in table.pop("actions").items() if action}
-    moves = {
-        name: {control: _axis(value) for control, value in section.items() if value}
-        for name, section in table.items()
-    }
-    return ControlMap(moves, actions)
+    given = {name: {at: value for at, value in table[name].items() if value} for name in table}
+    actions = given.pop("actions")
+    return ControlMap({name: _moves(section) for name, section in given.items()}, actions)
 
 
-def _axis(value: str) -> tuple[str, int]:
-    return value.removeprefix("-"), -1 if value.startswith("-") else 1
+def _moves(section: Mapping[str, str]) -> Moves:
+    return {at: (axis.removeprefix("-"), -1 if axis[0] == "-" else 1) for at, axis in section.items()}
 
 
 def _check(table: dict[str, Any], controls: Mapping[str, Any], where: str) -> None:
     """Check a person's table; an empty text takes a meaning away."""
     meanings = {name: (*axes, *(f"-{axis}" for axis in axes)) for name, axes in SECTIONS.items()}
     meanings["actions"] = tuple(ACTIONS)
+    check_names(table, meanings, where)
     for name, section in table.items():
-        if name not in meanings or not isinstance(section, dict):
-            expected = "], [".join(meanings)
-            raise HandrailError(f"{where}: section {shown(name)}: expected some of [{expected}]")
-        check_names(section, controls, f"{where}: [{name}]")
+        check_names(check(section, dict[str, Any], f"{where}: [{name}]"), controls, f"{where}: [{name}]")
         for control, value in section.items():
             check(value, Literal[*meanings[name], ""], f"{where}: [{name}] {control}")
 
 
-_AXES = {
-    "base.vx": ("base forward", "backward"),
-    "base.vy": ("base left", "right"),
-    "base.wz": ("base turns left", "right"),
-    "ee.vx": ("hand forward", "backward"),
-    "ee.vy": ("hand left", "right"),
-    "ee.vz": ("hand up", "down"),
-    "ee.wx": ("hand rolls right", "left"),
-    "ee.wy": ("hand tips down", "up"),
-    "ee.wz": ("hand turns left", "right"),
+_WAYS = {
+    "vx": ("forward", "backward"),
+    "vy": ("left", "right"),
+    "vz": ("up", "down"),
+    "wx": ("rolls right", "left"),
+    "wy": ("tips down", "up"),
+    "wz": ("turns left", "right"),
 }
 _CONTROLS = {
     "left_x": "left stick ↔",
@@ -194,11 +179,13 @@ def moves_help(moves: Moves) -> list[tuple[str, str]]:
     """Return what moves what: controls, and in words what they do."""
     lines = []
     for axis in dict.fromkeys(axis for axis, _ in moves.values()):
-        of_axis = [(control, sign) for control, (name, sign) in moves.items() if name == axis]
-        joint = axis.removeprefix("joint.").removesuffix("_joint").replace("_", " ")
-        forward, backward = _AXES.get(axis, (f"{joint} +", "−"))
-        ordered = sorted(of_axis, key=lambda each: -each[1])
-        lines.append((" / ".join(control_name(name) for name, _ in ordered), f"{forward} / {backward}"))
+        of_axis = {control: sign for control, (name, sign) in moves.items() if name == axis}
+        part, _, way = axis.partition(".")
+        joint = way.removesuffix("_joint").replace("_", " ")
+        there, back = _WAYS.get(way, (f"{joint} +", "−"))
+        said = there if part == "joint" else f"{'hand' if part == 'ee' else part} {there}"
+        controls = sorted(of_axis, key=lambda control: -of_axis[control])
+        lines.append((" / ".join(map(control_name, controls)), f"{said} / {back}"))
     return lines
 
 

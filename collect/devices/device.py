@@ -4,12 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from handrail.controllers.errors import HandrailError
-
-
-class DeviceGoneError(HandrailError):
-    """A device cannot be read: unplugged, not to be opened, silent for good. The message says what to do."""
-
 
 @dataclass(frozen=True)
 class DeviceInput:
@@ -18,7 +12,7 @@ class DeviceInput:
     time: float
     """When that was, on the operator's clock [s]."""
     deflections: Mapping[str, float] = field(default_factory=dict)
-    """Of the controls, or of the channels, that are not at rest, from −1 to 1."""
+    """Of the controls that are not at rest, from −1 to 1; after the map of channels, `hold` and `clutch`."""
     presses: tuple[str, ...] = ()
     """Controls that went down since the input before, or the actions that they ask for, in their order."""
     attended: bool = True
@@ -27,29 +21,23 @@ class DeviceInput:
     """Positions of a leader arm's joints, in its own units, by LeRobot's names."""
     round_trip: float = 0.0
     """From asking the device to its answer, where it is asked [s]."""
-    holds: frozenset[str] = frozenset()
-    """After its map: actions that last: `hold` (always, where no control asks for it) and `clutch`."""
 
 
 class Device(Protocol):
-    """Something in a person's hand. One thread opens, reads and closes it."""
+    """Something in a person's hand. One thread opens, reads and closes it; an error means that it is gone."""
 
-    @property
-    def name(self) -> str:
-        """Name in the data."""
-        ...
+    name: str
+    """Name in the data."""
 
     def open(self) -> None:
-        """Find it and get it ready; `DeviceGoneError` says what to do where it cannot be used."""
-        ...
+        """Find it and get it ready; the error says what to do where it cannot be used."""
 
     def read(self) -> DeviceInput:
-        """Return where its controls are, within 0.01 s; `DeviceGoneError` where it is not there any more."""
+        """Return where its controls are, within 0.01 s."""
         ...
 
     def close(self) -> None:
         """Give it back, also one that is gone."""
-        ...
 
 
 @dataclass(frozen=True)

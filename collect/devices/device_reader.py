@@ -1,11 +1,11 @@
 """Reads a device in a thread of its own, so that one that hangs never holds up the robot's loop."""
 
 import threading
-from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Self
 
-from handrail.collect.devices.control_map import ControlMap, Moves
-from handrail.collect.devices.device import Device, DeviceGoneError, DeviceInput
+from handrail.collect.devices.control_map import ControlMap, Moves, Steered
+from handrail.collect.devices.device import Device, DeviceInput
 from handrail.controllers.errors import HandrailError, message_of
 
 _RETRY = 1.0  # between two attempts to find a device that is gone [s]
@@ -19,6 +19,9 @@ class DeviceReader:
         device: opened, read and closed by the thread alone.
         controls: what its controls mean; nothing by default.
         retry: pause between two attempts to open it again [s].
+
+    Attributes:
+        trouble: why there is no input, and what to do.
     """
 
     def __init__(self, device: Device, controls: ControlMap | None = None, retry: float = _RETRY) -> None:
@@ -27,20 +30,17 @@ class DeviceReader:
         self._lock = threading.Lock()
         self._newest: DeviceInput | None = None
         self._presses: list[str] = []
-        self.trouble = ""  # why there is no input, and what to do
-        self._opened, self._ended = threading.Event(), threading.Event()
-        self._refusal: BaseException | None = None
+        self.trouble = ""
+        self._tried, self._ended = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"reads {device.name}", daemon=True)
 
     def start(self) -> Self:
         """Open the device."""
         self._thread.start()
-        opened = self._opened.wait(_PATIENCE)
-        if isinstance(self._refusal, HandrailError):
-            raise self._refusal
-        if self._refusal is not None or not opened:
-            why = message_of(self._refusal) if self._refusal else "it does not answer"
-            raise HandrailError(f"{self.device.name}: cannot be opened: {why}") from self._refusal
+        trouble = self.trouble if self._tried.wait(_PATIENCE) else f"{self.device.name}: does not answer"
+        if trouble:
+            self._ended.set()
+            raise HandrailError(trouble)
         return self
 
     def take(self) -> tuple[DeviceInput | None, tuple[str, ...]]:
@@ -49,19 +49,21 @@ class DeviceReader:
             presses, self._presses = tuple(self._presses), []
             return self._newest, presses
 
-    def bank(self, banks: Sequence[Moves]) -> Moves:
-        """Return the moves in force: those of the bank that was chosen."""
+    def moves(self, steered: Steered) -> Moves:
+        """Return the moves in force for what is steered: those of the bank that was chosen."""
+        banks = self.controls.banks(steered)
         return banks[self._bank % len(banks)]
 
-    def next_bank(self, banks: Sequence[Moves]) -> bool:
+    def next_bank(self, steered: Steered) -> bool:
         """Go on to the next bank; return whether that is the first one again."""
-        self._bank = (self._bank % len(banks) + 1) % len(banks)
+        size = len(self.controls.banks(steered))
+        self._bank = (self._bank % size + 1) % size
         return self._bank == 0
 
-    def input(self, banks: Sequence[Moves]) -> DeviceInput | None:
+    def input(self, steered: Steered) -> DeviceInput | None:
         """Return what the device says now in the words of its map; None while it is gone."""
         newest, presses = self.take()
-        return self.controls.meant(newest, presses, self.bank(banks)) if newest else None
+        return self.controls.meant(newest, presses, self.moves(steered)) if newest else None
 
     def close(self) -> None:
         """Give the device back."""
@@ -69,56 +71,32 @@ class DeviceReader:
         self._thread.join(timeout=2.0)
 
     def _run(self) -> None:
-        try:
-            self._attempt(self.device.open)
-            self._opened.set()
-            while not self._ended.is_set():
-                try:
-                    newest = self._attempt(self.device.read)
-                except DeviceGoneError as error:
-                    self._lose(error)
-                    self._find_again()
-                else:
-                    self._keep(newest)
-        except BaseException as error:
-            self._refusal = error
-            self._lose(error)
-            self._opened.set()
-        finally:
-            self._close()
-
-    def _keep(self, newest: DeviceInput) -> None:
-        with self._lock:
-            self._newest = newest
-            self._presses += newest.presses
-
-    def _find_again(self) -> None:
-        while not self._ended.wait(self._retry):
-            self._close()
+        is_open = False
+        while not self._ended.is_set():
             try:
-                self._attempt(self.device.open)
-            except DeviceGoneError as error:
-                self.trouble = str(error)
-            else:
-                self.trouble = ""
-                return
+                if not is_open:
+                    self.device.open()
+                    self.trouble, is_open = "", True
+                    self._tried.set()
+                newest = self.device.read()
+                with self._lock:
+                    self._newest = newest
+                    self._presses += newest.presses
+            except Exception as error:  # whatever a driver raises
+                self._lose(error)
+                self._close()
+                is_open = False
+                self._tried.set()
+                self._ended.wait(self._retry)
+        self._close()
 
-    def _lose(self, error: BaseException) -> None:
+    def _lose(self, error: Exception) -> None:
+        said = message_of(error)
+        if not isinstance(error, HandrailError):
+            said = f"{self.device.name}: {said}; check it and its cable, then press start"
         with self._lock:
-            self._newest, self.trouble = None, message_of(error)
-            self._presses.clear()
+            self._newest, self._presses, self.trouble = None, [], said
 
     def _close(self) -> None:
-        try:
+        with suppress(Exception):  # of a device that is gone anyway
             self.device.close()
-        except Exception as error:  # of a device that is gone anyway
-            self.trouble = self.trouble or message_of(error)
-
-    def _attempt[Result](self, step: Callable[[], Result]) -> Result:
-        """Do a step of the device; whatever a driver raises means that it is gone."""
-        try:
-            return step()
-        except HandrailError:
-            raise
-        except Exception as error:
-            raise DeviceGoneError(f"{self.device.name}: {message_of(error)}") from error

@@ -27,11 +27,6 @@ class Clutch:
         self._lower, self._upper = lower, upper
         self._offset: FloatArray | None = None
 
-    @property
-    def holds(self) -> bool:
-        """Whether it held last time."""
-        return self._offset is not None
-
     def targets(self, engaged: bool, leader: FloatArray, arm: FloatArray) -> tuple[float, ...]:
         """Return where the arm's joints shall go [rad], (n,); nowhere, (0,), while it is let go.
 
@@ -52,7 +47,7 @@ class Clutch:
 
 
 class Follower:
-    """Lets the robot's arm follow a leader, while the clutch holds.
+    """Lets the robot's arm follow a leader that says something, while the clutch holds.
 
     Args:
         model: of the robot.
@@ -61,34 +56,28 @@ class Follower:
 
     def __init__(self, model: RobotModel, calibration: LeaderCalibration) -> None:
         description = model.description
-        self._arm, self._first = description.arm_joints, len(description.base.joints)
+        self._names, self._arm = description.arm_joints, slice(len(description.base.joints), None)
         limits = description.limits
-        self._clutch = Clutch(limits.position_lower[self._first :], limits.position_upper[self._first :])
+        self._clutch = Clutch(limits.position_lower[self._arm], limits.position_upper[self._arm])
         self._calibration = calibration
 
     def targets(self, joints: Mapping[str, float], clutch: bool, q: FloatArray) -> tuple[float, ...]:
         """Return where the arm's joints shall go [rad], (n − b,), or nowhere, (0,).
 
         Args:
-            joints: of the leader, in its own units; none while it says nothing.
+            joints: of the leader, in its own units.
             clutch: whether the operator holds it.
             q: joint positions of the robot, (n,).
         """
-        if not joints:
-            clutch, leader = False, q[self._first :]
-        else:
-            leader = self._calibration.angles(joints, self._arm)
-        return self._clutch.targets(clutch, leader, q[self._first :])
+        return self._clutch.targets(clutch, self._calibration.angles(joints, self._names), q[self._arm])
 
     def apart(self, joints: Mapping[str, float], q: FloatArray) -> float:
         """Return how far the leader stands from the arm, at the joint where it is most [rad]."""
-        if not joints:
-            return 0.0
-        difference = self._calibration.angles(joints, self._arm) - q[self._first :]
-        driven = [name in self._calibration.joints for name in self._arm]
+        difference = self._calibration.angles(joints, self._names) - q[self._arm]
+        driven = [name in self._calibration.joints for name in self._names]
         return float(np.max(np.abs(difference[driven]), initial=0.0))
 
     def grips(self, joints: Mapping[str, float], before: bool) -> bool:
         """Return whether the gripper shall be closed; what it was before where the leader has no handle."""
         handle = self._calibration.gripper
-        return handle.grips(joints, before) if handle and joints else before
+        return handle.grips(joints, before) if handle else before

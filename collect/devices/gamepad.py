@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from handrail.collect.devices.device import DeviceGoneError, DeviceInput, StickShape
-from handrail.controllers.errors import not_installed
+from handrail.collect.devices.device import DeviceInput, StickShape
+from handrail.controllers.errors import HandrailError, not_installed
 
 AXES = ("left_x", "left_y", "right_x", "right_y", "left_trigger", "right_trigger")  # in SDL's order
 BUTTONS = (
@@ -47,11 +47,10 @@ class Gamepad:
         pygame.display.init()
         controllers.init()
         pygame.event.pump()
-        indices = range(controllers.get_count())
-        known = next((index for index in indices if controllers.is_controller(index)), None)
-        if known is None:
-            raise DeviceGoneError(_why_none(len(indices)))
-        self._pygame, self._pad, self._down = pygame, controllers.Controller(known), frozenset()
+        known = [index for index in range(controllers.get_count()) if controllers.is_controller(index)]
+        if not known:
+            raise HandrailError(_why_none(controllers.get_count()))
+        self._pygame, self._pad, self._down = pygame, controllers.Controller(known[0]), frozenset()
 
     def read(self) -> DeviceInput:
         """Return its sticks and buttons."""
@@ -59,7 +58,7 @@ class Gamepad:
         self._pygame.event.pump()
         self._pygame.event.clear()
         if not self._pad.attached():
-            raise DeviceGoneError("gamepad: unplugged; plug it in again, then press start")
+            raise HandrailError("gamepad: unplugged; plug it in again, then press start")
         sticks = {name: self._shape(self._pad.get_axis(index) / _FULL) for index, name in enumerate(AXES)}
         buttons = {name: 1.0 for index, name in enumerate(BUTTONS) if self._pad.get_button(index)}
         held = {name: value for name, value in sticks.items() if value} | buttons
@@ -69,9 +68,9 @@ class Gamepad:
 
     def close(self) -> None:
         """Give it back."""
-        if self._pad is not None:
+        if self._pad:
             self._pad.quit()
-            self._pad = None
+        self._pad = None
 
 
 def _sdl() -> tuple[Any, Any]:

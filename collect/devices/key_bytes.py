@@ -32,36 +32,25 @@ class Key:
 
 
 class KeyBytes:
-    """Takes bytes as they come, and says which keys they are.
-
-    Attributes:
-        dropped: sequences and pasted text that are no keys.
-    """
+    """Takes bytes as they come, and says which keys they are; pasted text is none."""
 
     def __init__(self) -> None:
         self._rest, self._since = b"", 0.0
-        self.dropped = 0
 
     def take(self, data: bytes, now: float) -> list[Key]:
         """Return the keys in what came now [s]; what is not whole yet waits for more."""
         self._since = now if data else self._since
         self._rest += data
-        keys: list[Key] = []
-        typed: list[Key] = []
+        keys: list[tuple[Key, bool]] = []
         while self._rest:
             size, key = self._first(waits=now - self._since < _ALONE)
             if not size:
                 break
-            if key is None:
-                self.dropped += 1
-            else:
-                keys.append(key)
-                typed += [key] if self._rest[0] != _ESCAPE else []
+            if key:
+                keys.append((key, self._rest[0] != _ESCAPE))
             self._rest = self._rest[size:]
-        if len(typed) > _MOST:
-            self.dropped += len(typed)
-            return [key for key in keys if key not in typed]
-        return keys
+        is_pasted = sum(is_typed for _, is_typed in keys) > _MOST
+        return [key for key, is_typed in keys if not (is_pasted and is_typed)]
 
     def _first(self, waits: bool) -> tuple[int, Key | None]:
         """Return how many bytes the first key has, 0 while it waits for more, and the key, None of no key."""

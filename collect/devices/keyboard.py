@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from handrail.collect.devices.device import DeviceGoneError, DeviceInput
+from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.key_bytes import (
     FOCUS_IN,
     FOCUS_OUT,
@@ -19,7 +19,7 @@ from handrail.collect.devices.key_bytes import (
     Key,
     KeyBytes,
 )
-from handrail.controllers.errors import message_of
+from handrail.controllers.errors import HandrailError
 
 HELD = 0.2  # after its last character, a key of a terminal that does not tell releases counts as let go [s]
 _AGAIN = 0.7  # what comes earlier is a repetition, whose first one comes after 0.25 to 0.66 s [s]
@@ -55,19 +55,19 @@ class KeyTerminal:
             import termios
             import tty
         except ImportError as error:  # Windows
-            raise DeviceGoneError(
+            raise HandrailError(
                 "keyboard: expected a terminal of Linux or macOS; say --operator browser"
             ) from error
         try:
             self._file = os.open(os.ttyname(sys.stdin.fileno()), os.O_RDWR | os.O_NOCTTY)
         except (OSError, ValueError, AttributeError) as error:
-            raise DeviceGoneError(
+            raise HandrailError(
                 "keyboard: expected a terminal to read keys from, found none; start it in a terminal without "
                 "a pipe or &, or say --operator browser"
             ) from error
         if not has_terminal():
             self._forget()
-            raise DeviceGoneError("keyboard: this runs in the background (&); bring it to the front with fg")
+            raise HandrailError("keyboard: this runs in the background (&); bring it to the front with fg")
         self._before = termios.tcgetattr(self._file)
         tty.setcbreak(self._file)
         quiet = termios.tcgetattr(self._file)
@@ -84,13 +84,10 @@ class KeyTerminal:
 
     def read(self, patience: float) -> bytes:
         """Return what came, after some time at most [s]."""
-        try:
-            ready, _, _ = select.select([self._file], [], [], patience)
-            data = os.read(self._file, _AT_ONCE) if ready else None
-        except (OSError, ValueError) as error:
-            raise DeviceGoneError(f"keyboard: the terminal is gone ({message_of(error)})") from error
+        ready, _, _ = select.select([self._file], [], [], patience)
+        data = os.read(self._file, _AT_ONCE) if ready else None
         if data == b"":
-            raise DeviceGoneError("keyboard: the terminal was closed")
+            raise HandrailError("keyboard: the terminal was closed")
         return data or b""
 
     def write(self, data: bytes) -> None:
@@ -134,11 +131,15 @@ class Keyboard:
         self, terminal: KeyTerminal | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._terminal, self._clock = terminal or KeyTerminal(), clock
-        self._begin()
 
     def open(self) -> None:
         """Take the terminal."""
-        self._begin()
+        self._bytes = KeyBytes()
+        self._held: dict[str, float] = {}
+        self._last: dict[str, float] = {}
+        self._tells_releases, self._in_focus = False, True
+        self._heard = self._asked = self._round_trip = 0.0
+        self._waits = False  # for an answer
         self._terminal.open()
 
     def read(self) -> DeviceInput:
@@ -162,14 +163,6 @@ class Keyboard:
     def close(self) -> None:
         """Put the terminal back as it was."""
         self._terminal.close()
-
-    def _begin(self) -> None:
-        self._bytes = KeyBytes()
-        self._held: dict[str, float] = {}
-        self._last: dict[str, float] = {}
-        self._tells_releases, self._in_focus = False, True
-        self._heard = self._asked = self._round_trip = 0.0
-        self._waits = False  # for an answer
 
     def _takes(self, key: Key, now: float) -> bool:
         """Take a key; return whether it was pressed now."""

@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from handrail.collect.devices.device import DeviceGoneError, DeviceInput
+from handrail.collect.devices.device import DeviceInput
 from handrail.collect.processor.units import number
 from handrail.collect.teleop_config import LeaderConfig
-from handrail.controllers.errors import HandrailError, message_of, shown, unknown_name
+from handrail.controllers.errors import HandrailError, message_of, unknown_name
 
 if TYPE_CHECKING:
     from lerobot.teleoperators.teleoperator import Teleoperator
@@ -33,9 +33,6 @@ class LeaderArm:
         name: what the data call it: LeRobot's type.
         sources: names of the positions that are needed.
         clock: of readings [s].
-
-    Attributes:
-        dropped: readings that made no sense.
     """
 
     def __init__(
@@ -48,7 +45,6 @@ class LeaderArm:
         self.name, self._make, self._sources, self._clock = name, make, sources, clock
         self._teleoperator: Teleoperator | None = None
         self._last = DeviceInput(-math.inf)
-        self.dropped = 0
 
     def open(self) -> None:
         """Connect it."""
@@ -66,10 +62,8 @@ class LeaderArm:
         now, joints = self._clock(), {name: number(said, name) for name in self._sources}
         if self._makes_sense(joints, now):
             self._last = DeviceInput(now, joints=joints)
-            return self._last
-        self.dropped += 1
-        if now - self._last.time > _GONE or not self._teleoperator.is_connected:
-            raise DeviceGoneError(f"{self.name}: {trouble}; check its cable and its power, then press start")
+        elif now - self._last.time > _GONE or not self._teleoperator.is_connected:
+            raise ConnectionError(trouble)
         return self._last
 
     def close(self) -> None:
@@ -94,33 +88,22 @@ def connected(teleoperator: "Teleoperator", name: str, calibrate: bool = False) 
         teleoperator: LeRobot's.
         name: its type.
         calibrate: let LeRobot calibrate it where it is not: it asks in the terminal.
-
-    Raises:
-        DeviceGoneError: it does not answer, may not be opened, or is not calibrated.
     """
     try:
         teleoperator.connect(calibrate=calibrate)
         calibrated = teleoperator.is_calibrated
     except Exception as error:  # whatever a driver's code raises
-        raise DeviceGoneError(_why_not(name, error)) from error
+        words, advice = message_of(error), "check --teleop.port (lerobot-find-port), cable and power"
+        if "ermission" in words or isinstance(error, PermissionError):
+            advice = "add yourself to its group (sudo usermod -aG dialout $USER), log in again"
+        raise HandrailError(f"{name}: cannot be connected: {words}; {advice}") from error
     if not calibrated:
         teleoperator.disconnect()
-        raise DeviceGoneError(
+        raise HandrailError(
             f"{name}: not calibrated; run lerobot-calibrate with the same --teleop.type, "
             "--teleop.port and --teleop.id once"
         )
     return teleoperator
-
-
-def _why_not(name: str, error: Exception) -> str:
-    """Return what to do where a leader cannot be connected."""
-    words = message_of(error)
-    if "ermission" in words or isinstance(error, PermissionError):
-        return (
-            f"{name}: its port may not be opened; add yourself to its group "
-            f"(sudo usermod -aG dialout $USER), log in again ({shown(words)})"
-        )
-    return f"{name}: cannot be connected: {words}; check --teleop.port (lerobot-find-port), cable and power"
 
 
 def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
@@ -134,8 +117,15 @@ def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
     known = leader_types()
     if config.type not in known:
         raise unknown_name("--teleop.type", config.type, known)
+    options = [option.strip() for option in config.options.split(",") if option.strip()]
+    if not all("=" in option for option in options):
+        raise HandrailError(
+            f"--teleop.type {config.type}: options {config.options}: expected name=value with commas"
+        )
+    given = {name: value for name, value in (("port", config.port), ("id", config.id)) if value}
+    given |= dict(option.split("=", 1) for option in options)
     try:
-        return make_teleoperator_from_config(draccus.decode(known[config.type], _settings(config)))
+        return make_teleoperator_from_config(draccus.decode(known[config.type], given))
     except Exception as error:  # whatever a driver's code raises
         raise HandrailError(f"--teleop.type {config.type}: {message_of(error)}") from error
 
@@ -150,16 +140,3 @@ def leader_types() -> Mapping[str, Any]:
             importlib.import_module(f"lerobot.teleoperators.{module.name}")
     register_third_party_plugins()
     return teleoperators.TeleoperatorConfig.get_known_choices()
-
-
-def _settings(config: LeaderConfig) -> dict[str, Any]:
-    """Return what LeRobot's settings are made of."""
-    given = {name: value for name, value in (("port", config.port), ("id", config.id)) if value}
-    for option in filter(None, (part.strip() for part in config.options.split(","))):
-        name, equals, value = option.partition("=")
-        if not equals or not name.isidentifier():
-            raise HandrailError(
-                f"--teleop.options {config.options}: expected name=value with commas between, got {option}"
-            )
-        given[name] = value
-    return given

@@ -4,7 +4,7 @@ import numpy as np
 from rich.console import RenderableType
 
 from handrail.collect.devices.card import Card
-from handrail.collect.devices.control_map import Moves
+from handrail.collect.devices.control_map import CLUTCH, HOLD, Steered
 from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.follower import Follower
@@ -13,6 +13,7 @@ from handrail.collect.operators.person.inputs import ASKS, Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
+from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
 
@@ -41,7 +42,8 @@ def choice_of(action: str, person: Person) -> Ask | None:
             at = FRAMES.index(setting.frame) if setting.frame in FRAMES else -1
             return Ask("frame", FRAMES[(at + 1) % len(FRAMES)])
         case "focus":
-            return Ask("focus", "hand" if setting.focus == "base" else "base")
+            focus = "hand" if setting.focus == "base" else "base"
+            return Ask("focus", focus) if setting.mode.by_focus else None
         case "practice":
             return Ask("practice", not person.practises)
     return Ask(action) if action in ASKS else None
@@ -55,19 +57,18 @@ class LocalPerson:
         main: the device that the operator is named after.
         beside: another one, such as the terminal's keys.
         follower: of a leader arm, which is then the main device; the other one has the clutch and the base.
-        card: shows how it stands.
     """
 
     def __init__(
         self,
         person: Person,
         main: DeviceReader,
-        beside: DeviceReader | None,
-        follower: Follower | None,
-        card: Card,
+        beside: DeviceReader | None = None,
+        follower: Follower | None = None,
     ) -> None:
-        self._person, self._main, self._beside = person, main, beside
-        self._follower, self._card = follower, card
+        self._person, self._main, self._beside, self._follower = person, main, beside, follower
+        self._sources = [main, beside] if beside else [main]
+        self._card = Card(person, main.device.name, [source.controls for source in self._sources])
         self._grip = False
 
     def __rich__(self) -> RenderableType:
@@ -81,84 +82,81 @@ class LocalPerson:
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Show the task of a new episode."""
-        self._card.begin(env.task.description, env.task.horizon)
+        self._card.task, self._card.horizon = env.task.description, env.task.horizon
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
-        self._grip = False
+        self._grip, self._card.brakes = False, ""
         self._person.reset(view, rng)
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
-        main = self._main.input(self._banks(self._main))
-        beside = self._beside.input(self._banks(self._beside)) if self._beside else None
-        for heard in (main, beside):
-            for action in heard.presses if heard else ():
-                self._do(action)
-        self._take(main, beside, view)
-        answer = self._person.act(view)
-        moving = self._beside if self._follower and self._beside else self._main
-        moves = moving.bank(self._banks(moving))
-        apart = self._follower.apart(main.joints, view.state.q) if self._follower and main else None
-        self._card.show(view, self._person, moves, self._trouble, self._grip, apart)
+        said = [source.input(self._steered) for source in self._sources]
+        for action in (action for heard in said if heard for action in heard.presses):
+            self._do(action)
+        self._take(said[0], said[-1] if self._follower else said[0], view)
+        answer, card = self._person.act(view), self._card
+        moving = self._sources[-1] if self._follower else self._main
+        card.view, card.moves, card.grip = view, moving.moves(self._steered), self._grip
+        card.trouble = self._main.trouble or moving.trouble
         return answer
 
     def see(self, frame: Frame) -> None:
         """Take note of how the controller fared."""
-        self._card.see(frame.diagnostics.status)
+        status = Status(frame.diagnostics.status)
+        self._card.brakes = status.value.replace("_", " ") if status.brakes else ""
 
     def end(self, outcome: Outcome) -> None:
         """Take note that an episode is over."""
-        self._card.say("saved" if outcome.kept else "not saved")
+        self._card.before = "saved" if outcome.kept else "not saved"
 
     def close(self) -> None:
         """Give the devices back."""
-        for source in filter(None, (self._main, self._beside)):
+        for source in self._sources:
             source.close()
 
-    def _banks(self, source: DeviceReader) -> list[Moves]:
-        """Return the banks of a device for what is steered now."""
+    @property
+    def _steered(self) -> Steered:
         meaning = self._person.meaning
         channels, mask = meaning.channels, meaning.mask(self._person.setting)
         base = len(channels.base)
         joints = mask[channels.joint_slice]
         arm = tuple(name for name, owned in zip(channels.joints[base:], joints[base:], strict=True) if owned)
         drives = bool(mask[channels.base_slice].any() or (base and joints[:base].all()))
-        return source.controls.banks(bool(mask[channels.tool_slice].any()), drives, arm)
+        return Steered(bool(mask[channels.tool_slice].any()), drives, arm)
 
-    def _take(self, main: DeviceInput | None, beside: DeviceInput | None, view: View) -> None:
-        """Tell the person where the inputs are; that nobody drives, while a device that is needed is gone."""
-        other = beside if self._follower else main
-        if main is None or other is None:
+    def _take(self, main: DeviceInput | None, other: DeviceInput | None, view: View) -> None:
+        """Tell the person where the inputs are; that nobody drives, while a device that is needed is gone.
+
+        Args:
+            main: of the device that the operator is named after.
+            other: of the one with the dead-man.
+            view: what there is to see.
+        """
+        if main is None or other is None or (self._follower and not main.joints):
+            self._card.apart = None
             self._person.lose()
             return
-        on, axes, targets = main.attended and "hold" in main.holds, main.deflections, ()
+        on, targets = main.attended and other.attended, ()
         if self._follower:
-            on = main.attended and other.attended
-            targets = self._follower.targets(main.joints, on and "clutch" in other.holds, view.state.q)
-            self._grip, axes = self._follower.grips(main.joints, self._grip), other.deflections
-        values = tuple(
-            float(np.clip(axes.get(name, 0.0), -1.0, 1.0)) for name in self._person.meaning.channels.names
-        )
-        inputs = Input(on, self._main.device.name, self._grip, values, targets=targets)
+            clutch = on and CLUTCH in other.deflections
+            targets = self._follower.targets(main.joints, clutch, view.state.q)
+            self._grip = self._follower.grips(main.joints, self._grip)
+            self._card.apart = self._follower.apart(main.joints, view.state.q)
+        else:
+            on = on and HOLD in main.deflections
+        names = self._person.meaning.channels.names
+        axes = tuple(float(np.clip(other.deflections.get(name, 0.0), -1.0, 1.0)) for name in names)
+        inputs = Input(on, self._main.device.name, self._grip, axes, targets=targets)
         self._person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
-
-    @property
-    def _trouble(self) -> str:
-        return self._main.trouble or (self._beside.trouble if self._beside and self._follower else "")
 
     def _do(self, action: str) -> None:
         """Do what a control asks for."""
         if action == "grip":
             self._grip = not self._grip
         elif action == "help":
-            self._card.turn_over()
-        elif action == "focus":  # after the last bank comes the other focus, where the mode has one
-            if self._main.next_bank(self._banks(self._main)) and self._person.setting.mode.by_focus:
-                self._ask(action)
-        else:
-            self._ask(action)
-
-    def _ask(self, action: str) -> None:
-        if (ask := choice_of(action, self._person)) is not None:
+            self._card.is_helping = not self._card.is_helping
+        elif action == "focus" and not self._main.next_bank(self._steered):
+            return  # after the last bank comes the other focus
+        elif ask := choice_of(action, self._person):
             self._person.ask(ask)

@@ -1,6 +1,7 @@
 """The operators with a device at this computer, by the names of the command line."""
 
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 
 from handrail.collect.config import RecordConfig
 from handrail.collect.devices import gamepad, spacemouse
@@ -10,8 +11,7 @@ from handrail.collect.devices.calibration import (
     load_calibration,
     same_arm,
 )
-from handrail.collect.devices.card import Card
-from handrail.collect.devices.control_map import control_of, load_map
+from handrail.collect.devices.control_map import CLUTCH, HOLD, control_of, load_map
 from handrail.collect.devices.device import StickShape
 from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.follower import Follower
@@ -48,10 +48,11 @@ def open_device(
     """
     main, beside = _reader(config.operator, config.teleop), None
     if config.operator != "keyboard" and has_terminal():
-        beside = DeviceReader(Keyboard(), load_map("keyboard", NAMES).only())
-    _open(main, beside)
-    say(f"{config.operator}: hold {control_of([main.controls], 'hold') or 'what moves'} to move")
-    return _person(config, env, modes or build_modes(config, env), main, beside)
+        beside = _reader("keyboard", TeleopConfig())
+        beside.controls = beside.controls.only()
+    person = _person(config, env, modes or build_modes(config, env), main, beside)
+    say(f"{config.operator}: hold {control_of([main.controls], HOLD) or 'what moves'} to move")
+    return person
 
 
 def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPerson:
@@ -64,10 +65,9 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     main = DeviceReader(LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources))
     beside = _reader(teleop.beside, teleop)
     beside.controls = beside.controls.only("base")
-    _open(main, beside)
-    clutch = control_of([beside.controls], "clutch")
-    say(f"{teleop.type}: hold {clutch} on the {teleop.beside} to move the arm")
-    return _person(config, env, modes, main, beside, Follower(env.model, calibration))
+    person = _person(config, env, modes, main, beside, Follower(env.model, calibration))
+    say(f"{teleop.type}: hold {control_of([beside.controls], CLUTCH)} on the {teleop.beside} to move the arm")
+    return person
 
 
 def _reader(name: str, teleop: TeleopConfig) -> DeviceReader:
@@ -89,23 +89,15 @@ def _person(
     beside: DeviceReader | None,
     follower: Follower | None = None,
 ) -> LocalPerson:
+    """Return the person, their devices opened; where one cannot be, those before are given back."""
     person = Person(env.model, modes, config.mode_name)
     person.ask(Ask("frame", "base"))
-    tables = [reader.controls for reader in (main, beside) if reader]
-    card = Card(main.device.name, tables, len(env.model.description.base.joints))
-    return LocalPerson(person, main, beside, follower, card)
-
-
-def _open(*readers: DeviceReader | None) -> None:
-    """Open devices; where one cannot be, those before are given back."""
-    there = [reader for reader in readers if reader]
-    try:
-        for reader in there:
+    with ExitStack() as stack:
+        for reader in filter(None, (main, beside)):
+            stack.callback(reader.close)
             reader.start()
-    except BaseException:
-        for reader in there:
-            reader.close()
-        raise
+        stack.pop_all()
+    return LocalPerson(person, main, beside, follower)
 
 
 def _led(modes: Mapping[str, TeleopMode], env: HandrailEnv, first: str) -> dict[str, TeleopMode]:

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from handrail.collect.devices.device import DeviceGoneError, DeviceInput, StickShape
-from handrail.controllers.errors import message_of, not_installed
+from handrail.collect.devices.device import DeviceInput, StickShape
+from handrail.controllers.errors import HandrailError, not_installed
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 CONTROLS = (*AXES, *(f"button_{number}" for number in range(1, 33)))
@@ -32,9 +32,6 @@ class SpaceMouse:
     Args:
         shape: of its axes.
         clock: of readings [s].
-
-    Attributes:
-        dropped: reports that made no sense.
     """
 
     name = "spacemouse"
@@ -42,8 +39,6 @@ class SpaceMouse:
     def __init__(self, shape: StickShape | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._shape, self._clock = shape or StickShape(), clock
         self._hid: Any = None
-        self.dropped = 0
-        self._forget()
 
     def open(self) -> None:
         """Find a SpaceMouse."""
@@ -53,14 +48,16 @@ class SpaceMouse:
             raise not_installed("--operator spacemouse", "hidapi", "devices") from error
         found = next((each for each in hid.enumerate() if _is_one(each)), None)
         if found is None:
-            raise DeviceGoneError("SpaceMouse: expected one, found none; plug it in, then try again")
-        self._forget()
+            raise HandrailError("SpaceMouse: expected one, found none; plug it in, then try again")
+        self._axes: dict[str, float] = dict.fromkeys(AXES, 0.0)
+        self._down: frozenset[str] = frozenset()
+        self._heard = 0.0
         self._hid = hid.device()
         try:
             self._hid.open_path(found["path"])
         except OSError as error:
             where = found["path"].decode(errors="replace")
-            raise DeviceGoneError(
+            raise HandrailError(
                 f"SpaceMouse: {where} may not be read; put the line {_RULE} "
                 "into /etc/udev/rules.d/70-spacemouse.rules, plug it in again"
             ) from error
@@ -68,33 +65,22 @@ class SpaceMouse:
     def read(self) -> DeviceInput:
         """Return its axes and buttons."""
         presses: list[str] = []
-        try:
-            report = self._hid.read(64, _WAIT)
-            for _ in range(_MOST_REPORTS):
-                if not report:
-                    break
-                presses += self._take(bytes(report))
-                report = self._hid.read(64, 0)
-        except (OSError, ValueError) as error:
-            raise DeviceGoneError(
-                f"SpaceMouse: unplugged ({message_of(error)}); plug it in again, then press start"
-            ) from error
+        report = self._hid.read(64, _WAIT)
+        for _ in range(_MOST_REPORTS):
+            if not report:
+                break
+            presses += self._take(bytes(report))
+            report = self._hid.read(64, 0)
         now = self._clock()
-        deflected = any(self._axes.values())
-        silent = deflected and now - self._heard > _SILENCE
+        silent = any(self._axes.values()) and now - self._heard > _SILENCE
         held = {name: value for name, value in self._axes.items() if value} | dict.fromkeys(self._down, 1.0)
         return DeviceInput(self._heard if silent else now, held, tuple(presses), attended=not silent)
 
     def close(self) -> None:
         """Give it back."""
-        if self._hid is not None:
+        if self._hid:
             self._hid.close()
-            self._hid = None
-
-    def _forget(self) -> None:
-        self._axes: dict[str, float] = dict.fromkeys(AXES, 0.0)
-        self._down: frozenset[str] = frozenset()
-        self._heard = 0.0
+        self._hid = None
 
     def _take(self, report: bytes) -> list[str]:
         """Take a report; return the buttons that it says went down."""
@@ -108,7 +94,6 @@ class SpaceMouse:
         whole = names and len(data) >= 2 * len(names)
         counts = struct.unpack_from(f"<{len(names)}h", data) if whole else ()
         if not counts or max(map(abs, counts)) > _MOST * _FULL:
-            self.dropped += 1
             return []
         for name, at in zip(names, _OF_DEVICE, strict=False):
             self._axes[name] = self._shape(-counts[at] / _FULL)

@@ -44,11 +44,11 @@ def pad():
     """Plug a gamepad of SDL's in."""
     from device_players import VirtualPad
 
-    from handrail.collect.devices.device import DeviceGoneError
     from handrail.collect.devices.gamepad import Gamepad
+    from handrail.controllers.errors import HandrailError
 
     made = VirtualPad()
-    with pytest.raises(DeviceGoneError):  # also begins SDL
+    with pytest.raises(HandrailError):  # also begins SDL
         Gamepad().open()
     made.plug_in()
     yield made

@@ -10,7 +10,6 @@ from rich.console import Console
 
 from handrail.collect.devices import gamepad, spacemouse
 from handrail.collect.devices.calibration import LeaderCalibration, LeaderGripper, LeaderJoint
-from handrail.collect.devices.card import Card
 from handrail.collect.devices.control_map import ControlMap, load_map
 from handrail.collect.devices.key_bytes import NAMES
 from handrail.collect.devices.local_person import LocalPerson
@@ -45,13 +44,10 @@ class Driven:
         self.person.ask(Ask("frame", "base"))
         controls = load_map(device, CONTROLS[device]) if device in CONTROLS else ControlMap({}, {})
         self.main, self.beside = PlayedReader(device, self.clock, controls), None
-        tables = [controls]
         if beside:
-            table = load_map(beside, CONTROLS[beside])
-            tables.append(table.only("base") if follower else table.only())
-            self.beside = PlayedReader(beside, self.clock, tables[1])
-        self.card = Card(device, tables, 3)
-        self.local = LocalPerson(self.person, self.main, self.beside, follower, self.card)
+            table = load_map(beside, CONTROLS[beside]).only(*(["base"] if follower else []))
+            self.beside = PlayedReader(beside, self.clock, table)
+        self.local = LocalPerson(self.person, self.main, self.beside, follower)
         self.q, self.time = HOME.copy(), 0.0
         self.local.reset(self.view(), np.random.default_rng(0))
 

@@ -7,7 +7,7 @@ import pytest
 from places import ROOT
 
 from handrail.collect.devices import gamepad, spacemouse
-from handrail.collect.devices.control_map import ACTIONS, load_map
+from handrail.collect.devices.control_map import ACTIONS, Steered, load_map
 from handrail.collect.devices.key_bytes import NAMES
 from handrail.controllers.errors import HandrailError
 
@@ -35,7 +35,7 @@ def test_the_tables_of_handrail_pass_the_check_of_a_persons(device):
 )
 def test_every_channel_of_every_mode_can_be_moved_both_ways(device, hand, base, arm):
     """In one bank or another; a stick has both ways, a key one."""
-    banks = load_map(device, CONTROLS[device]).banks(hand, base, arm)
+    banks = load_map(device, CONTROLS[device]).banks(Steered(hand, base, arm))
     moved = [(axis, sign) for bank in banks for axis, sign in bank.values()]
     wanted = {f"ee.{name}" for name in ("vx", "vy", "vz", "wx", "wy", "wz")} if hand else set()
     wanted |= {"base.vx", "base.vy", "base.wz"} if base else set()
@@ -45,13 +45,13 @@ def test_every_channel_of_every_mode_can_be_moved_both_ways(device, hand, base, 
 
 
 def test_banks_hold_what_no_two_controls_share():
-    banks = load_map("gamepad", gamepad.CONTROLS).banks(False, True, ARM)
+    banks = load_map("gamepad", gamepad.CONTROLS).banks(Steered(False, True, ARM))
     assert [sorted(axis for axis, _ in bank.values()) for bank in banks] == [
         sorted(ARM[:4]),
         sorted(ARM[4:]),
         ["base.vx", "base.vy", "base.wz"],
     ]
-    assert len(load_map("keyboard", NAMES).banks(False, True, ARM)) == 1
+    assert len(load_map("keyboard", NAMES).banks(Steered(False, True, ARM))) == 1
 
 
 def test_the_gamepad_means_what_it_means_in_the_browser():
@@ -88,12 +88,15 @@ def test_a_persons_changes_win_and_an_empty_text_takes_away(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('[arm]\na = "ee.vx"', "section 'arm': expected some of [hand], [turn], [base], [both], [joints]"),
+        (
+            '[arm]\na = "ee.vx"',
+            "unknown entry 'arm'; expected some of hand, turn, base, both, joints",
+        ),
         ('[hand]\nlever = "ee.vx"', "[hand]: unknown entry 'lever'; expected some of a, b, back"),
         ('[hand]\na = "base.vx"', "[hand] a: expected one of ee.vx"),
         ('[actions]\na = "jump"', "[actions] a: expected one of hold, clutch"),
         ("[hand]\na = 3", "got 3"),
-        ("hand = 3", "section 'hand'"),
+        ("hand = 3", "[hand]: expected a table, got 3"),
         ("[hand", "not valid TOML"),
     ],
 )

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from handrail.collect.devices.device import DeviceGoneError, DeviceInput
+from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.device_reader import DeviceReader
 from handrail.controllers.errors import HandrailError
 
@@ -66,7 +66,7 @@ def test_the_newest_wins_and_no_press_is_lost(device, poller):
 
 @pytest.mark.parametrize(
     "error",
-    [DeviceGoneError("lever: unplugged; plug it in"), OSError(19, "No such device"), ZeroDivisionError()],
+    [HandrailError("lever: unplugged; plug it in"), OSError(19, "No such device"), ZeroDivisionError()],
 )
 def test_one_that_is_gone_is_none_until_it_is_there_again(device, poller, error):
     poller.start()
@@ -87,14 +87,12 @@ def test_what_was_pressed_before_it_was_gone_is_forgotten(device, poller):
     device.readings = [DeviceInput(0.0, presses=("success",))]
     poller.start()
     eventually(lambda: not device.readings)
-    device.trouble = DeviceGoneError("lever: unplugged")
+    device.trouble = HandrailError("lever: unplugged")
     eventually(lambda: poller.trouble)
     assert poller.take() == (None, ())
 
 
-@pytest.mark.parametrize(
-    "error", [DeviceGoneError("lever: expected one, found none"), OSError("no such port")]
-)
+@pytest.mark.parametrize("error", [HandrailError("lever: expected one, found none"), OSError("no such port")])
 def test_one_that_cannot_be_opened_at_first_is_refused_in_one_line(device, poller, error):
     device.trouble = error
     with pytest.raises(HandrailError, match=r"lever: (expected one|no such port)"):

@@ -155,7 +155,10 @@ def test_a_recording_with_a_leader_arm_and_a_gamepad(tmp_path, pad, listens, mon
         ((*LEADER, "--teleop.beside", "mouse"), "Expected one of ('keyboard', 'gamepad')"),
         ((*LEADER, "--mode", "ee"), "expected a mode that steers every joint of the arm: joints, direct,"),
         ((*LEADER, "--mode", "direct_single"), "leader; got direct_single"),
-        ((*LEADER, "--mode", "leader", "--teleop.id", "new"), "no calibration for this robot yet"),
+        (
+            (*LEADER, "--mode", "leader", "--teleop.id", "new"),
+            "expected a calibration of the leader arm for this robot",
+        ),
         (("--operator", "spacemouse"), "SpaceMouse: expected one, found none; plug it in"),
         (("--operator", "keyboard"), "keyboard: expected a terminal to read keys from"),
     ],

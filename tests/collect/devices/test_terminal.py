@@ -11,8 +11,8 @@ import time
 
 import pytest
 
-from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.keyboard import KeyTerminal, has_terminal
+from handrail.controllers.errors import HandrailError
 
 pytest.importorskip("termios", reason="only Linux and macOS have such terminals")
 
@@ -78,7 +78,7 @@ def test_without_a_terminal_it_says_what_to_do(monkeypatch):
     with open(os.devnull) as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         assert not has_terminal()
-        with pytest.raises(DeviceGoneError) as error:
+        with pytest.raises(HandrailError) as error:
             KeyTerminal().open()
     said = str(error.value)
     assert "expected a terminal to read keys from, found none; start it in a terminal without a pipe" in said
