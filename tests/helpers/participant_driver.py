@@ -5,7 +5,7 @@ import re
 import time
 
 import numpy as np
-from page_driver import SLOW, Page
+from page_driver import LOST, SLOW, Page
 from page_words import keys, way
 from playwright.sync_api import expect
 
@@ -122,10 +122,10 @@ class ParticipantDriver(Page):
     def _drives(self):
         return bool(DRIVING.match(self.text("phase"))) and not self.title
 
-    def _reach(self, patience=25.0):
-        """Steer the hand as the page says."""
+    def _reach(self, patience=60.0):
+        """Steer the hand as the page says; let go where the page was too slow to be heard, then go on."""
         end = time.monotonic() + patience
-        while time.monotonic() < end and self._drives:
-            self.hold(keys(way(self.text("way"))[1], 0.02, 0.08))
+        while time.monotonic() < end and (self._drives or self.text("phase") == LOST):
+            self.hold(keys(way(self.text("way"))[1], 0.02, 0.08) if self._drives else ())
             time.sleep(0.02)
         self.hold(())

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import cockpit_attacks
@@ -43,15 +43,13 @@ class Owner:
 
     def _drive(self, connection):
         sequence = 0
-        with connection as socket:
+        with connection as socket, suppress(ConnectionClosed):  # the recording has ended
             self._socket = socket
             while not self._ends:
                 try:
                     said = socket.recv(timeout=0.02)
                 except TimeoutError:
                     said = "{}"
-                except ConnectionClosed:
-                    return
                 frame = json.loads(said).get("frame") if isinstance(said, str) else None
                 if frame:
                     self.frame = frame
