@@ -39,9 +39,9 @@ BENCHES = {
     ),
     "cases": Bench("the paper's cases A, B and C", "cases.showcase:ShowcaseConfig", "cases.showcase:main"),
     "speed": Bench(
-        "the controller's update against IPOPT and mink, its QP solver against DAQP and PIQP",
-        "speed.config:ProfileConfig",
-        "speed.profiling:main",
+        "the controller's update over degrees of freedom, pairs and stages, beside other solvers",
+        "speed.config:SpeedConfig",
+        "speed.speed:main",
     ),
     "operators": Bench(
         "scripted operators in every task and mode", "operators.file:TrialsConfig", "operators.trials:main"

@@ -1,19 +1,24 @@
 """What all benches share: the flags that say where results go, the JSON, the tables, the part of a page."""
 
+import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import to_builtins
 
 from handrail.collect.flags import check_json, check_page
-from handrail.controllers.typed import check_settings
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import check, check_settings
+from handrail.controllers.versions import versions
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.storage.strict_json import write_json
+from handrail.datasets.storage.atomic import explained, write_whole
+from handrail.datasets.storage.strict_json import read_json, write_json
 
 PROGRAM = "python -m handrail.scripts.bench"
 SPREAD = ("median_ms", "p95_ms", "p99_ms", "worst_ms")
@@ -43,7 +48,8 @@ def command_line(name: str, config: Any) -> str:
         if isinstance(value, bool) and value != entry.default:
             words.append("--" + ("" if value else "no_") + entry.name)
         elif value != entry.default:
-            words.append(f"--{entry.name} {value}")
+            shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
+            words.append(f"--{entry.name} {shown}")
     return " ".join(words)
 
 
@@ -73,6 +79,66 @@ def report(
         write_part(Path(config.page).expanduser(), name, name, "\n\n".join(dict.fromkeys(filter(None, body))))
     for path in filter(None, (config.json, config.page)):
         console.print(f"Written: {path}")
+
+
+class Rows[Row]:
+    """Rows that were measured, in a file that is whole after each: what it has is not measured again.
+
+    Args:
+        path: of the file, in `--json`; without one they are kept in memory.
+        head: settings that all rows share; a file of other settings is refused.
+        kind: type of a row.
+        key: what is different in every row.
+        programs: whose versions the file names.
+        name: of the rows in the file.
+        unnamed: settings of files from before there was a choice.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        head: Mapping[str, Any],
+        kind: type[Row],
+        key: Callable[[Row], Any],
+        programs: Sequence[str],
+        name: str = "rows",
+        unnamed: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._flag, self._path = f"--json {path}", Path(path).expanduser()
+        self._head, self._kind, self._key, self._name = {**head}, kind, key, name
+        self._programs, self._is_kept = programs, bool(path)
+        self._rows: dict[Any, Row] = {}
+        if path and self._path.exists():
+            self._read(unnamed or {})
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._rows
+
+    def __getitem__(self, key: Any) -> Row:
+        return self._rows[key]
+
+    def add(self, row: Row) -> None:
+        """Keep a row, on the disk too."""
+        self._rows[self._key(row)] = row
+        if not self._is_kept:
+            return
+        head = self._head | {"versions": versions(*self._programs)}
+        rows = ",\n".join(json.dumps(to_builtins(self._rows[key])) for key in sorted(self._rows))
+        text = f'{json.dumps(head)[:-1]}, "{self._name}": [\n{rows}\n]}}\n'
+        with explained(self._flag):
+            write_whole(self._path, text.encode())
+
+    def _read(self, unnamed: Mapping[str, Any]) -> None:
+        try:
+            content = read_json(self._path)
+            found = {name: content.get(name, unnamed.get(name)) for name in self._head}
+            if found != self._head:
+                words = f"expected {self._head}, got {found}; choose another file"
+                raise HandrailError(f"{self._flag}: {words}")
+            rows = check(content[self._name], list[self._kind], f"{self._flag}: {self._name}")
+            self._rows = {self._key(row): row for row in rows}
+        except (OSError, ValueError, AttributeError, LookupError, TypeError) as error:
+            raise HandrailError(f"{self._flag}: expected a file of this bench, got {error!r}") from error
 
 
 def machine(load_before: float) -> dict[str, Any]:

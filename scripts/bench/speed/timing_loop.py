@@ -1,7 +1,9 @@
-"""One case of the profile: a controller in a closed loop with an ideal robot, timed."""
+"""One case of the bench: a controller in a closed loop with an ideal robot, timed."""
 
-from dataclasses import dataclass, replace
-from time import perf_counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from time import perf_counter, thread_time
 
 import numpy as np
 
@@ -14,10 +16,12 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.robot.description import load_description
+from handrail.controllers.robot.description import RobotDescription, load_description
 from handrail.controllers.robot.model import RobotModel
-from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.robot.scene_shapes import floor_shapes, scene_shapes
+from handrail.controllers.robot.shape import Obstacle, Shape, ShapeKind
 from handrail.scripts.bench.goal_reaching.scenes import clearance
+from handrail.scripts.bench.report import spread
 
 PERIOD = 0.05  # of the updates [s]
 _INTENT = 20  # updates of one intent
@@ -25,40 +29,56 @@ _EPISODE = 100  # updates in one scene
 _NEAREST, _FARTHEST = 0.12, 0.30  # between robot and obstacle at home [m]
 _SPEED = 0.4  # [m/s, rad/s]
 _MODES = (("ee",), ("base",), ("base", "ee"), ("joint",))
+_TIAGO = str(Path(__file__).with_name("tiago_pro.toml"))
+_ROBOTS = {  # by degrees of freedom: the description, and words in the names of joints that are left out
+    8: ("lekiwi", ()),
+    9: ("ridgeback_ur10", ()),
+    10: ("ridgeback_panda", ()),
+    13: (_TIAGO, ("left_",)),
+    18: (_TIAGO, ("head_",)),
+    20: (_TIAGO, ()),
+}
+
+
+@dataclass
+class Times:
+    """How long calls took: processor time of this thread, which others lengthen less; on the clock."""
+
+    cpu: list[float] = field(default_factory=list)  # [s]
+    wall: list[float] = field(default_factory=list)  # [s]
+
+    def of[Result](self, call: Callable[..., Result], *arguments: object) -> Result:
+        """Call, take the time, and return what the call returned."""
+        wall, cpu = perf_counter(), thread_time()
+        result = call(*arguments)
+        self.cpu.append(thread_time() - cpu)
+        self.wall.append(perf_counter() - wall)
+        return result
+
+    def spreads(self, first: int = 0) -> dict[str, dict[str, float]]:
+        """Return median, p95, p99 and worst of both clocks [ms], from some call on."""
+        return {"cpu": spread(self.cpu[first:]), "wall": spread(self.wall[first:])}
 
 
 @dataclass(frozen=True)
 class SpeedCase:
     """What one loop measures."""
 
-    name: str  # unique
-    own: str = "all"  # which of the robot's own pairs are watched: `all`, `few` or `none`
-    obstacles: int = 0  # how many
+    degrees: int = 9  # of freedom
+    pairs: int = 0  # to keep apart, about
     horizon: int = 10  # stages
-    robot: str = "ridgeback_ur10"  # its description
 
-
-CASES = (
-    SpeedCase("no_collision", own="none"),
-    SpeedCase("pairs_30", own="few", obstacles=2),
-    SpeedCase("pairs_100", obstacles=7),
-)
-
-
-def longer(*horizons: int) -> list[SpeedCase]:
-    """Return the cases with other numbers of stages."""
-    return [
-        replace(case, name=f"{case.name}_horizon_{horizon}", horizon=horizon)
-        for case in CASES
-        for horizon in horizons
-    ]
+    @property
+    def name(self) -> str:
+        """A unique name."""
+        return f"n={self.degrees} pairs={self.pairs} N={self.horizon}"
 
 
 @dataclass(frozen=True)
 class Update:
-    """One timed update: what went in, what came out, and how long it took [s]."""
+    """One timed update: what went in, what came out, and how long it took."""
 
-    seconds: float
+    cpu: float  # [s]
     obstacles: tuple[Obstacle, ...]
     state: State
     intent: Intent
@@ -74,95 +94,118 @@ class TimingLoop:
     Args:
         case: what to measure.
         seed: of scenes and intents; cases with the same robot and seed get the same ones.
+
+    Attributes:
+        times: of all updates.
     """
 
     def __init__(self, case: SpeedCase, seed: int) -> None:
         self.case = case
-        self.model = _robot(case.robot, case.own)
-        self.mpc = MaskedMpc(self.model, MpcSettings(horizon=case.horizon))
+        self.model, self._obstacle_count = _robot(case)
+        self._scale = self.model.description.world.scale
+        self.mpc = MaskedMpc(self.model, MpcSettings.of(self._scale, horizon=case.horizon))
+        self.times = Times()
         self._rng = np.random.default_rng(seed)
-        self._count = 0
 
     def run(self, count: int) -> list[Update]:
         """Return some updates, timed one by one."""
         return [self._update() for _ in range(count)]
 
-    def _begin(self) -> None:
-        """Put the robot at home in a new scene."""
-        self._obstacles = _random_scene(self.model, self.case.obstacles, self._rng)
-        self.mpc.reset(self._obstacles)
-        self._state = State(self.model.description.home, np.zeros(self.model.size))
-
     def _update(self) -> Update:
-        if self._count % _EPISODE == 0:
-            self._begin()
+        count = len(self.times.cpu)
+        if count % _EPISODE == 0:
+            self._obstacles = self._random_scene()
+            self.mpc.reset(self._obstacles)
+            self._state = State(self.model.description.home, np.zeros(self.model.size))
         state = self._state
-        if self._count % _INTENT == 0:
-            self._intent = _random_intent(self.model, state, self._obstacles, self._rng)
+        if count % _INTENT == 0:
+            self._intent = self._random_intent(state)
         intent = replace(self._intent, time=state.time)
         problem = self.mpc.build_problem(state, intent)
         guess = self.mpc.loop.guess(state.time, self.case.horizon, self.model.size)
-        start = perf_counter()
-        command = self.mpc.update(state, intent)
-        seconds = perf_counter() - start
+        command = self.times.of(self.mpc.update, state, intent)
         after = command.velocity(PERIOD)
         self._state = State(state.q + 0.5 * PERIOD * (state.v + after), after, state.time + PERIOD)
-        self._count += 1
         asked = self._obstacles, state, intent, problem, guess
-        return Update(seconds, *asked, self.mpc.plan, command.diagnostics.status)
+        return Update(self.times.cpu[-1], *asked, self.mpc.plan, command.diagnostics.status)
 
+    def _random_scene(self) -> tuple[Obstacle, ...]:
+        """Return obstacles of all kinds, each 0.12 to 0.3 m · scale from the robot at home."""
+        obstacles: list[Obstacle] = []
+        while len(obstacles) < self._obstacle_count:
+            obstacle = self._random_obstacle(f"obstacle_{len(obstacles)}")
+            if _NEAREST < clearance(self.model, obstacle) / self._scale < _FARTHEST:
+                obstacles.append(obstacle)
+        return tuple(obstacles)
 
-def _robot(robot: str, pairs: str) -> RobotModel:
-    """Return a robot with `all` its own pairs, `few` or `none` at all (it then meets no obstacle either)."""
-    description = load_description(robot)
-    if pairs == "none":
-        hand, none = replace(description.end_effector, gripper=None), np.zeros(0)
-        description = replace(description, end_effector=hand, collision=(), self_pairs=(), self_margins=none)
-    elif pairs == "few":
-        few = slice(None, None, 4)
-        description = replace(
-            description, self_pairs=description.self_pairs[few], self_margins=description.self_margins[few]
+    def _random_obstacle(self, name: str) -> Obstacle:
+        rng, home = self._rng, self.model.description.home
+        shapes: tuple[tuple[ShapeKind, FloatArray], ...] = (
+            ("box", rng.uniform(0.1, 0.5, 3)),
+            ("cylinder", rng.uniform([0.05, 0.2], [0.2, 0.8])),
+            ("capsule", rng.uniform([0.04, 0.2], [0.15, 0.6])),
+            ("sphere", rng.uniform(0.05, 0.2, 1)),
         )
-    return RobotModel(description)
+        kind, size = shapes[rng.integers(4)]
+        place = self._scale * rng.uniform([-1.2, -1.2, 0.1], [1.6, 1.2, 1.4])
+        position = np.append(home[:2], 0.0) + place
+        shape = Shape(kind, self._scale * size)
+        return Obstacle(name, shape, position, turned(np.eye(3), rng.uniform(-np.pi, np.pi)))
 
-
-def _random_scene(model: RobotModel, count: int, rng: np.random.Generator) -> tuple[Obstacle, ...]:
-    """Return obstacles of all kinds, each 0.12 to 0.3 m from the robot at home."""
-    home = model.description.home
-    obstacles: list[Obstacle] = []
-    while len(obstacles) < count:
-        obstacle = _random_obstacle(f"obstacle_{len(obstacles)}", home, rng)
-        if _NEAREST < clearance(model, obstacle) < _FARTHEST:
-            obstacles.append(obstacle)
-    return tuple(obstacles)
-
-
-def _random_obstacle(name: str, home: FloatArray, rng: np.random.Generator) -> Obstacle:
-    shape = (
-        Shape("box", rng.uniform(0.1, 0.5, 3)),
-        Shape("cylinder", rng.uniform([0.05, 0.2], [0.2, 0.8])),
-        Shape("capsule", rng.uniform([0.04, 0.2], [0.15, 0.6])),
-        Shape("sphere", rng.uniform(0.05, 0.2, 1)),
-    )[rng.integers(4)]
-    position = np.append(home[:2], 0.0) + rng.uniform([-1.2, -1.2, 0.1], [1.6, 1.2, 1.4])
-    return Obstacle(name, shape, position, turned(np.eye(3), rng.uniform(-np.pi, np.pi)))
-
-
-def _random_intent(
-    model: RobotModel, state: State, obstacles: tuple[Obstacle, ...], rng: np.random.Generator
-) -> Intent:
-    """Return an intent in one mode or another: random, and towards an obstacle where there is one."""
-    channels = Channels.of(model.description)
-    mask = channels.mask(*(group for group in _MODES[rng.integers(len(_MODES))] if group != "base"))
-    mask[channels.base_slice] = bool(channels.base) and rng.random() < 0.5
-    values = rng.uniform(-_SPEED, _SPEED, channels.size)
-    if obstacles:
-        target = obstacles[rng.integers(len(obstacles))].position
-        values[channels.tool_slice][:3] = _SPEED * _unit(target - model.pose(state.q).position)
-        if channels.base:
-            values[:2] = _SPEED * turned(_unit(target[:2] - state.q[:2]), -state.q[2])
-    return Intent(np.where(mask, values, 0.0), mask, time=state.time)
+    def _random_intent(self, state: State) -> Intent:
+        """Return an intent in one mode or another: random, and towards an obstacle where there is one."""
+        rng, speed, channels = self._rng, _SPEED * self._scale, Channels.of(self.model.description)
+        mask = channels.mask(*(group for group in _MODES[rng.integers(len(_MODES))] if group != "base"))
+        mask[channels.base_slice] = bool(channels.base) and rng.random() < 0.5
+        values = rng.uniform(-speed, speed, channels.size)
+        if self._obstacles:
+            target = self._obstacles[rng.integers(len(self._obstacles))].position
+            values[channels.tool_slice][:3] = speed * _unit(target - self.model.pose(state.q).position)
+            if channels.base:
+                values[:2] = speed * turned(_unit(target[:2] - state.q[:2]), -state.q[2])
+        return Intent(np.where(mask, values, 0.0), mask, time=state.time)
 
 
 def _unit(vector: FloatArray) -> FloatArray:
     return vector / max(float(np.linalg.norm(vector)), 1e-9)
+
+
+def _robot(case: SpeedCase) -> tuple[RobotModel, int]:
+    """Return a case's robot and how many obstacles there are: half of the pairs are with them, or more.
+
+    The robot watches as many of its own pairs, evenly chosen, as the other half wants. Without pairs it has
+    no shapes.
+    """
+    file, words = _ROBOTS[case.degrees]
+    description = _without(load_description(file), words)
+    if not case.pairs:
+        hand, none = replace(description.end_effector, gripper=None), np.zeros(0)
+        bare = replace(description, end_effector=hand, collision=(), self_pairs=(), self_margins=none)
+        return RobotModel(bare), 0
+    model = RobotModel(description)
+    each, floor, own = len(scene_shapes(model)), len(floor_shapes(model)), len(description.self_pairs)
+    few = int(np.clip(case.pairs - floor - each * round(case.pairs / 2 / each), 0, own))
+    chosen = np.linspace(0, own - 1, few).round().astype(int)
+    pairs, margins = tuple(description.self_pairs[k] for k in chosen), description.self_margins[chosen]
+    fewer = replace(description, self_pairs=pairs, self_margins=margins)
+    return RobotModel(fewer), max(round((case.pairs - floor - few) / each), 0)
+
+
+def _without(description: RobotDescription, words: tuple[str, ...]) -> RobotDescription:
+    """Return a robot without the joints that have one of these words in their names, nor such shapes."""
+
+    def stays(name: str) -> bool:
+        return not any(word in name for word in words)
+
+    joints = np.array([stays(name) for name in description.joints])
+    pairs = np.array([all(map(stays, pair)) for pair in description.self_pairs])
+    limits = description.limits
+    return replace(
+        description,
+        arm_joints=tuple(filter(stays, description.arm_joints)),
+        home=description.home[joints],
+        limits=replace(limits, **{each.name: getattr(limits, each.name)[joints] for each in fields(limits)}),
+        collision=tuple(shape for shape in description.collision if stays(shape.name)),
+        self_pairs=tuple(pair for pair in description.self_pairs if all(map(stays, pair))),
+        self_margins=description.self_margins[pairs],
+    )

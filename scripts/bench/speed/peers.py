@@ -1,0 +1,272 @@
+"""Other solvers on the problems of a loop: the converged one, differential inverse kinematics, QP solvers."""
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib import import_module
+from time import monotonic
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from scipy import sparse
+
+from handrail.collect.world.mink import MinkController
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.core.library import Memory, functions
+from handrail.controllers.errors import not_installed
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.robot.parts import PlacedShape, Placement
+from handrail.controllers.solvers.converged import ConvergedSolver
+from handrail.controllers.solvers.dense import dense
+from handrail.controllers.solvers.real_time import NOTHING_ACTIVE, RealTimeSolver
+from handrail.scripts.bench.speed.timing_loop import PERIOD, Times, TimingLoop, Update
+
+Solve = Callable[[], FloatArray | None]
+"""What is timed; returns the solution, or None."""
+Take = Callable[[Update], Solve]
+"""Takes the problem of an update; what this does is not timed."""
+
+_PATIENCE = 20.0  # of a case, with one peer [s]
+_MOST = 60.0  # of one problem [s]
+_TOLERANCE = 1e-6  # of the interior-point method
+_NEAREST = 20  # pairs that pink's barrier looks at, at most
+_KEPT = 0.02  # distance that it keeps, of all pairs alike [m]
+
+
+class Peer:
+    """One other solver on some problems of a loop; the first one, at which things are built, does not count.
+
+    Args:
+        name: of the solver.
+        loop: whose problems.
+    """
+
+    def __init__(self, name: str, loop: TimingLoop) -> None:
+        self._take = PEERS[name](loop)
+        self._times, self._solved, self._ours = Times(), list[bool](), list[float]()
+        self._spent = 0.0
+
+    def solve(self, update: Update) -> None:
+        """Time an update's problem, unless its patience with this case is over."""
+        if self._spent > _PATIENCE:
+            return
+        begun = monotonic()
+        try:
+            with _at_most(_MOST):
+                solved = self._times.of(self._take(update)) is not None
+        except TimeoutError:
+            self._spent = np.inf
+            return
+        self._solved.append(solved)
+        self._ours.append(update.cpu)
+        self._spent += monotonic() - begun
+
+    def measured(self) -> dict[str, Any]:
+        """Return its times, and our median over its own on the same problems; none where it was too slow."""
+        solved, ours = self._solved[1:], self._ours[1:]
+        counts = {"solves": len(solved), "failed": solved.count(False)}
+        if not solved:
+            return counts
+        ratio = float(np.median(ours) / np.median(self._times.cpu[1:]))
+        return {**counts, **self._times.spreads(1), "ratio": ratio}
+
+
+@contextmanager
+def _at_most(seconds: float) -> Iterator[None]:
+    """Raise a TimeoutError after some time, once a call of a library returns."""
+
+    def ring(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _ipopt(loop: TimingLoop) -> Take:
+    """Return the converged solver, IPOPT, from the same guess."""
+    settings = loop.mpc.settings
+    solver = ConvergedSolver(loop.mpc.residuals, settings.horizon, loop.model.size, settings.dt)
+
+    def take(update: Update) -> Solve:
+        def solve() -> FloatArray | None:
+            plan = solver.solve(update.problem, update.guess)
+            return plan.u if plan.solved else None
+
+        return solve
+
+    return take
+
+
+def _mink(loop: TimingLoop) -> Take:
+    """Return one step of mink for the hand's part of an intent: same shapes, pairs, margins and limits."""
+    controller = MinkController(loop.model, PERIOD)
+    hand = Channels.of(loop.model.description).mask("ee")
+    among: Any = None
+
+    def take(update: Update) -> Solve:
+        nonlocal among
+        if among is not update.obstacles:
+            among = update.obstacles
+            controller.reset(among)
+
+        def solve() -> FloatArray | None:
+            command = controller.update(update.state, replace(update.intent, mask=hand))
+            return None if command.diagnostics.status.brakes else command.velocity(PERIOD)
+
+        return solve
+
+    return take
+
+
+def _pink(loop: TimingLoop) -> Take:
+    """Return one step of pink for the hand: same shapes and limits; its barrier keeps 2 cm of the nearest."""
+    try:
+        pink, barriers = import_module("pink"), import_module("pink.barriers")
+    except ImportError as error:
+        raise not_installed("pink", "pin-pink") from error
+    model, limits = loop.model.pinocchio.copy(), loop.model.description.limits
+    model.lowerPositionLimit, model.upperPositionLimit = limits.position_lower, limits.position_upper
+    model.velocityLimit = limits.velocity
+    task = pink.FrameTask("tool", position_cost=1.0, orientation_cost=1.0)
+    tasks = [task, pink.tasks.DampingTask(cost=0.01)]
+    twist = Channels.of(loop.model.description).tool_slice
+    among: Any = None
+    configuration: Any = None
+    kept: list[Any] = []
+
+    def take(update: Update) -> Solve:
+        nonlocal among, configuration, kept
+        if among is not update.obstacles:
+            among = update.obstacles
+            shapes = _geometry(loop, update)
+            count = min(len(shapes.collisionPairs), _NEAREST)
+            kept = [barriers.SelfCollisionBarrier(count, gain=1.0, d_min=_KEPT)] if count else []
+            configuration = pink.Configuration(
+                model, model.createData(), update.state.q, collision_model=shapes
+            )
+
+        def solve() -> FloatArray | None:
+            configuration.update(update.state.q)
+            here = configuration.get_transform_frame_to_world("tool")
+            moved = PERIOD * update.intent.values[twist]
+            target = pin.SE3(pin.exp3(moved[3:]) @ here.rotation, here.translation + moved[:3])
+            task.set_target(target)
+            try:
+                return pink.solve_ik(configuration, tasks, PERIOD, solver="daqp", barriers=kept)
+            except (pink.exceptions.PinkError, ValueError, RuntimeError):
+                return None
+
+        return solve
+
+    return take
+
+
+def _geometry(loop: TimingLoop, update: Update) -> pin.GeometryModel:
+    """Return the shapes of a robot and its scene, and the same pairs, the floor left out."""
+    import coal
+
+    kinds = {"box": coal.Box, "capsule": coal.Capsule, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
+    around = [
+        PlacedShape(each.name, "universe", each.shape, Placement(each.position, each.rotation))
+        for each in update.obstacles
+    ]
+    found, index = pin.GeometryModel(), {}
+    for placed in (*loop.model.description.collision, *around):
+        joint, placement = loop.model.mount(placed)
+        shape = kinds[placed.shape.kind](*placed.shape.size.tolist())
+        index[placed.name] = found.addGeometryObject(pin.GeometryObject(placed.name, joint, placement, shape))
+    for first, second in update.problem.collision.pairs:
+        if second in index:
+            found.addCollisionPair(pin.CollisionPair(index[first], index[second]))
+    return found
+
+
+def _programs(loop: TimingLoop) -> Callable[[Update], Memory]:
+    """Return what puts the QP of an update into a core of its own."""
+    settings = loop.mpc.settings
+    solver = RealTimeSolver(loop.mpc.residuals, settings.horizon, loop.model.size, settings.dt)
+    return lambda update: solver.program(update.problem, update.guess)
+
+
+def _own_qp(loop: TimingLoop) -> Take:
+    """Return the controller's active-set method; begins with the rows that were active in the last QP."""
+    program, active = _programs(loop), NOTHING_ACTIVE
+
+    def take(update: Update) -> Solve:
+        core, scene = program(update), update.problem.collision.memory
+        core.active[: len(active)], core.fields.active_rows, core.fields.work = active, len(active), np.inf
+        solve_program = functions().solve_program
+
+        def solve() -> FloatArray | None:
+            nonlocal active
+            solved = solve_program(core, scene)
+            active = core.active[: core.fields.active_rows].copy()
+            return np.append(core.s, core.slacks) if solved else None
+
+        return solve
+
+    return take
+
+
+def _daqp(loop: TimingLoop) -> Take:
+    """Return DAQP, a dual active-set method for dense QPs; begins like our own."""
+    import daqp
+
+    program, active = _programs(loop), np.zeros(0, dtype=np.int64)
+
+    def take(update: Update) -> Solve:
+        qp = dense(program(update), update.problem.collision.memory)
+        sense, least = np.isin(qp.rows, active).astype(np.int32), np.full(len(qp.upper), -1e30)
+
+        def solve() -> FloatArray | None:
+            nonlocal active
+            x, _, flag, info = daqp.solve(qp.hessian, qp.gradient, qp.matrix, qp.upper, least, sense)
+            active = qp.rows[np.abs(info["lam"]) > 0.0]
+            return x if flag > 0 else None
+
+        return solve
+
+    return take
+
+
+def _piqp(loop: TimingLoop) -> Take:
+    """Return PIQP, a proximal interior-point method, on sparse matrices; it cannot begin with a guess."""
+    try:
+        piqp: Any = import_module("piqp")
+    except ImportError as error:
+        raise not_installed("PIQP", "piqp", "profile") from error
+    program = _programs(loop)
+
+    def take(update: Update) -> Solve:
+        qp = dense(program(update), update.problem.collision.memory)
+        hessian, matrix = sparse.csc_matrix(qp.hessian), sparse.csc_matrix(qp.matrix)
+
+        def solve() -> FloatArray | None:
+            solver = piqp.SparseSolver()
+            solver.settings.kkt_solver = piqp.KKTSolver.sparse_ldlt_cond  # the fastest of its methods here
+            solver.settings.eps_abs = solver.settings.eps_rel = _TOLERANCE
+            solver.setup(hessian, qp.gradient, None, None, matrix, None, qp.upper)
+            done = solver.solve() == piqp.Status.PIQP_SOLVED
+            return np.array(solver.result.x) if done else None
+
+        return solve
+
+    return take
+
+
+PEERS: dict[str, Callable[[TimingLoop], Take]] = {
+    "ipopt": _ipopt,
+    "mink": _mink,
+    "pink": _pink,
+    "own_qp": _own_qp,
+    "daqp": _daqp,
+    "piqp": _piqp,
+}
+"""The solvers by name, as `speed.config.PEERS` lists them."""
