@@ -19,7 +19,7 @@
 #define BAND 30         /* numbers touched for each variable and change besides the active rows */
 
 /* H = L L' in place: band[j, i - j] = H[i, j], (M, B); return whether it is positive definite. */
-int64_t factor(double *band, int64_t size, int64_t width) {
+WIDE int64_t factor(double *band, int64_t size, int64_t width) {
   for (int64_t j = 0; j < size; j++) {
     double *row = band + j * width;
     if (!(row[0] > 0.0)) return 0;
@@ -32,7 +32,7 @@ int64_t factor(double *band, int64_t size, int64_t width) {
 }
 
 /* x = L^-1 x from an entry on, before which it is 0. */
-static void forward(const Core *c, double *x, int64_t start) {
+WIDE static void forward(const Core *c, double *x, int64_t start) {
   for (int64_t j = start; j < c->M; j++) {
     const double *row = c->band + j * c->B;
     x[j] /= row[0];
@@ -40,7 +40,7 @@ static void forward(const Core *c, double *x, int64_t start) {
   }
 }
 
-static void backward(const Core *c, double *x) {
+WIDE static void backward(const Core *c, double *x) {
   for (int64_t j = c->M - 1; j >= 0; j--) {
     const double *row = c->band + j * c->B;
     x[j] = (x[j] - dot(row + 1, x + j + 1, SMALLER(c->B, c->M - j) - 1)) / row[0];
@@ -55,7 +55,7 @@ static void solve_upper(const Core *c, int64_t count, double *x) { /* x = T'^-1 
 }
 
 /* Split the new row into a combination of the active ones and what is normal to them; return its square. */
-static double project(Core *c, int64_t count) {
+WIDE static double project(Core *c, int64_t count) {
   double whole = dot(c->fresh, c->fresh, c->V), before = whole, square;
   memcpy(c->normal, c->fresh, c->V * sizeof(double));
   memset(c->coordinates, 0, count * sizeof(double));
@@ -87,7 +87,7 @@ static int64_t append(Core *c, int64_t count, int64_t place, double square, doub
 }
 
 /* Make a row inactive; rotations make T triangular again. */
-static int64_t drop(Core *c, int64_t count, int64_t index) {
+WIDE static int64_t drop(Core *c, int64_t count, int64_t index) {
   int64_t V = c->V;
   double *T = c->triangle;
   c->is_held[c->held[index]] = 0;
@@ -117,7 +117,7 @@ static int64_t drop(Core *c, int64_t count, int64_t index) {
 }
 
 /* The nearest point to -f at which all active rows hold: y = -f + Q'w with T w = b + M f, multipliers -T'^-1 w. */
-static void settle(Core *c, int64_t count) {
+WIDE static void settle(Core *c, int64_t count) {
   int64_t V = c->V;
   for (int64_t i = 0; i < count; i++)
     c->shares[i] = (c->right[i] - dot(c->triangle + i * V, c->shares, i)) / c->triangle[i * V + i];

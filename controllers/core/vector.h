@@ -5,6 +5,14 @@
 #include <stdint.h>
 #include <string.h>
 
+/* A function that is also compiled for wider vector registers, where compiler and system choose between the two when
+   the library is loaded; its sums are the same. */
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define WIDE
+#endif
+
 #define SMALLER(a, b) ((a) < (b) ? (a) : (b))
 #define LARGER(a, b) ((a) > (b) ? (a) : (b))
 
