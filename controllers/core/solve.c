@@ -4,9 +4,9 @@
 #include "core.h"
 #include "vector.h"
 
-#define MORE_STEPS 1          /* at most, in one update */
+#define MORE_STEPS 2          /* at most, in one update */
 #define LARGE 0.2             /* change of an acceleration near obstacles that asks for another step, by its limit */
-#define COARSE 0.2           /* share of the promised descent by which a linearised cost may be wrong, */
+#define COARSE 0.01           /* share of the promised descent by which a linearised cost may be wrong, */
 #define SMALL 0.1             /* or of a descent that is this share of the cost */
 #define TOLERANCE 1e-6        /* of the hard limits */
 #define SMALLEST_SHARE 0.0625 /* of a step that makes the cost rise */
@@ -85,7 +85,13 @@ static double damp(Core *c, double before) {
 
 /* Whether the linearisation was too coarse: of the cost, or of distances after a large step. */
 static int is_far(const Core *c, double before, double after, double descent) {
-  return fabs(after - before - descent) > COARSE * LARGER(fabs(descent), SMALL * after);
+  int64_t largest = 0;
+  if (fabs(after - before - descent) > COARSE * LARGER(fabs(descent), SMALL * after)) return 1;
+  for (int64_t i = 0; i < c->active_rows; i++) largest = LARGER(largest, c->active[i]);
+  if (largest < SLACKS + 6 * c->M) return 0;
+  for (int64_t i = 0; i < c->M; i++)
+    if (!(fabs(c->step_u[i]) <= LARGE * c->a_max[i % c->n])) return 1;
+  return 0;
 }
 
 /* Keep the speeds within their limits: cutting is monotone, so that no acceleration becomes larger. Begin with the
