@@ -23,11 +23,13 @@ class Interrupts:
         self._previous = {number: signal.signal(number, self._interrupt) for number in signals}
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None = None, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
         if self._asked and (outer := _current()):
             outer._asked = True
+        if self._asked and kind is SystemError:  # a compiled library made it of the interrupt
+            raise KeyboardInterrupt
 
     @property
     def asked(self) -> bool:

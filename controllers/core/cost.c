@@ -12,7 +12,7 @@ static double affine_error(const Core *c, int64_t k, int64_t row) {
 
 /* Add weight g g' of a row g of stage k's variables to the band, and weight error g to the slope. */
 WIDE static void add_row(const Core *c, int64_t k, const double *g, double weight, double error, double *slope,
-                    double *band) {
+                         double *band) {
   int64_t width = c->B, start = (k - 2) * c->n;
   for (int64_t a = LARGER(0, -start); a < width; a++) {
     double share = weight * g[a];

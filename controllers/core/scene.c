@@ -80,7 +80,8 @@ static void gradient_of(const Scene *s, int64_t pair, const double *witness, dou
 }
 
 /* Raise lower bounds, (P), by what is known at another configuration. */
-WIDE static void raise(Scene *s, const double *q, const double *there, double time, const double *known, double *values) {
+WIDE static void raise(Scene *s, const double *q, const double *there, double time, const double *known,
+                       double *values) {
   for (int64_t p = 0; p < s->P; p++) s->bound[p] = known[p] - s->speed[p] * time;
   for (int64_t j = 0; j < s->n; j++) {
     double moved = fabs(q[j] - there[j]);

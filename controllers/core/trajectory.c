@@ -4,13 +4,14 @@
 
 /* A coordinate at a time in units of dt. */
 static double at(const double *velocities, int64_t count, int64_t n, double knot, int64_t j) {
-  double time = SMALLER(knot, (double)(count - 1));
-  int64_t index = SMALLER((int64_t)time, count - 2);
-  double weight = time - (double)index;
-  return (1.0 - weight) * velocities[index * n + j] + weight * velocities[(index + 1) * n + j];
+  const double *column = velocities + j;
+  if (!(knot < (double)(count - 1))) return column[(count - 1) * n];
+  int64_t index = (int64_t)LARGER(knot, 0.0);
+  double weight = knot - (double)index;
+  return (1.0 - weight) * column[index * n] + weight * column[(index + 1) * n];
 }
 
-/* At times in units of dt, (number,), none before the first knot; (number, n). */
+/* At times in units of dt, (number,); (number, n). */
 void interpolate(const double *velocities, int64_t count, int64_t n, const double *knots, int64_t number, double *out) {
   for (int64_t k = 0; k < number; k++)
     for (int64_t j = 0; j < n; j++) out[k * n + j] = at(velocities, count, n, knots[k], j);

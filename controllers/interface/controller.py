@@ -28,10 +28,11 @@ class State:
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
-        for name, usual in (("q", None), ("v", None), ("commanded", "v"), ("expected", "q")):
+        for name in ("q", "v"):
+            object.__setattr__(self, name, frozen(getattr(self, name), what=f"{name} of a state"))
+        for name, usual in (("commanded", self.v), ("expected", self.q)):
             values = getattr(self, name)
-            known = values is not None or usual is None
-            array = frozen(values, what=f"{name} of a state") if known else getattr(self, usual)
+            array = usual if values is None else frozen(values, what=f"{name} of a state")
             object.__setattr__(self, name, array)
         object.__setattr__(self, "time", real(self.time, "time of a state"))
 

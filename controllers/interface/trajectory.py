@@ -6,6 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.core.library import functions
+from handrail.controllers.errors import HandrailError
 
 _ROUNDING = 1e-5  # of a time, relative: no later than the last knot
 
@@ -20,7 +21,10 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
-        object.__setattr__(self, "velocities", frozen(self.velocities))
+        velocities = frozen(self.velocities)
+        if velocities.ndim != 2 or not len(velocities):
+            raise HandrailError(f"trajectory: expected velocities (k, n), got shape {velocities.shape}")
+        object.__setattr__(self, "velocities", velocities)
 
     def velocity(self, time: float) -> FloatArray:
         """Return the velocity `time` [s] from now, (n,); zero after the last knot."""
@@ -63,7 +67,8 @@ class Trajectory:
         step = self.dt / samples
         ahead = step * np.arange(samples * (len(self.velocities) - 1) + 1) - self.elapsed
         times = np.append(0.0, ahead[ahead > 0.0])
-        knots, velocities = (times + self.elapsed) / self.dt, np.empty((len(times), len(q)))
+        knots = (times + self.elapsed) / self.dt
+        velocities = np.empty((len(times), self.velocities.shape[1]))
         functions().interpolate(self.velocities, *self.velocities.shape, knots, len(knots), velocities)
         moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
         return np.vstack([q, q + np.cumsum(moves, axis=0)]), times

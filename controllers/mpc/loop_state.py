@@ -79,6 +79,7 @@ class LoopState(NamedTuple):
         if self.command is None:
             return np.zeros((horizon, size))
         elapsed = self.elapsed(time)
-        plan, stored = self.command.plan, self.stored
-        on_plan = plan is not None and stored is not None and not stored.is_over(elapsed)
-        return (plan if on_plan else self.command).accelerations(horizon, elapsed)
+        followed: Trajectory = self.command
+        if self.command.plan is not None and self.stored is not None and not self.stored.is_over(elapsed):
+            followed = self.command.plan
+        return followed.accelerations(horizon, elapsed)

@@ -54,8 +54,10 @@ class Limiter:
 
     def to_rest(self, velocities: FloatArray, dt: float) -> FloatArray:
         """Return velocities at knots, (k, n), and the fastest stop from the last one."""
-        count, n = velocities.shape
+        count, n = len(velocities), len(self.limits.velocity)
         last = np.ascontiguousarray(velocities[-1], dtype=np.float64)
+        if last.shape != (n,):
+            raise HandrailError(f"velocity to stop from: expected {n} numbers, got shape {last.shape}")
         room, needed = -1, _USUAL_STOP
         while needed > room:
             room, result = needed, np.empty((count + needed, n))
