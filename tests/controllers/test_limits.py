@@ -1,10 +1,12 @@
 """No command leaves the limits, whatever is asked."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import load_description
 from handrail.controllers.safety.limiter import Limiter
 
@@ -50,6 +52,12 @@ def test_a_target_of_the_wrong_size_brakes():
     velocity, clipped = LIMITER.limit(previous, np.ones(3), 0.05)
     assert clipped
     assert np.all(np.abs(velocity) < np.abs(previous))
+
+
+@pytest.mark.parametrize("last", [np.ones(4), np.full(9, np.nan), np.full(9, np.inf)])
+def test_a_stop_from_nonsense_is_refused(last):
+    with pytest.raises(HandrailError, match="velocity to stop from"):
+        LIMITER.to_rest(last[None], 0.1)
 
 
 @given(INSIDE)

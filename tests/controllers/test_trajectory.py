@@ -1,10 +1,12 @@
 """A trajectory's laws: the rest of it is the same curve; it leads where its velocities integrate to."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.trajectory import Trajectory
 
 KNOTS = arrays(float, (6, 2), elements=st.floats(-2, 2))
@@ -44,3 +46,13 @@ def test_accelerations_lead_from_knot_to_knot(velocities, elapsed):
     reached = trajectory.velocity(0.0) + 0.1 * np.cumsum(accelerations, axis=0)
     expected = [trajectory.velocity(0.1 * k) for k in range(1, 9)]
     np.testing.assert_allclose(reached, expected, atol=1e-7)
+
+
+@pytest.mark.parametrize("shape", [(3,), (0, 2), (2, 2, 2)])
+def test_velocities_without_knots_are_refused(shape):
+    with pytest.raises(HandrailError, match="trajectory: expected velocities"):
+        Trajectory(np.zeros(shape), 0.1)
+
+
+def test_a_single_knot_is_held():
+    np.testing.assert_array_equal(Trajectory(np.ones((1, 2)), 0.1).accelerations(3, 0.05), np.zeros((3, 2)))
