@@ -1,10 +1,7 @@
-"""Settings of the bench `operators`, and the file of its trials: one line an episode, whole after each."""
+"""Settings of the bench `operators`, and the file of its trials: one line an episode."""
 
-import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import Annotated, Any
+from dataclasses import dataclass, field
+from typing import Annotated
 
 from msgspec import Meta
 
@@ -14,11 +11,9 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import AtLeastOne, Count, check_settings
-from handrail.controllers.versions import SIMULATION, versions
+from handrail.controllers.versions import SIMULATION
 from handrail.datasets.lists import Names
-from handrail.datasets.storage.atomic import explained, write_whole
-from handrail.datasets.storage.strict_json import read_json
-from handrail.scripts.bench.report import ReportConfig
+from handrail.scripts.bench.report import ReportConfig, Rows
 
 SLOW_MODE = "direct_single"  # needs more time than the tasks give
 SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.0}  # [s]
@@ -67,7 +62,6 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
 
 
 FORMAT = "handrail.trials/1"
-_PLACES = 4  # digits that are kept
 _UNNAMED = {"robot": "ridgeback_ur10"}  # of files from before there was a choice
 
 
@@ -90,55 +84,13 @@ class OperatorTrial:
     switching: float  # time for which their hands were away from the input meanwhile [s]
 
 
-class TrialsFile:
-    """Trials of one robot, seed, noise and number of persons, in memory and on the disk.
-
-    Args:
-        path: of the file.
-        config: what is asked for.
-    """
-
-    def __init__(self, path: Path, config: TrialsConfig) -> None:
-        self._path = path
-        settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
-        self._head = {"format": FORMAT, **settings}
-        self._trials = {_key(trial): trial for trial in self._read()} if path.exists() else {}
-
-    def add(self, trial: OperatorTrial) -> None:
-        """Keep a trial, on the disk too."""
-        self._trials[_key(trial)] = trial
-        head = self._head | {"versions": versions(*SIMULATION)}
-        rows = ",\n".join(json.dumps(_rounded(each)) for _, each in sorted(self._trials.items()))
-        text = f'{json.dumps(head)[:-1]}, "trials": [\n{rows}\n]}}\n'
-        with explained(f"--json {self._path}"):
-            write_whole(self._path, text.encode())
-
-    def missing(self, task: str, mode: str, episodes: int) -> list[int]:
-        """Return the numbers of the episodes that have not been run."""
-        return [episode for episode in range(episodes) if (task, mode, episode) not in self._trials]
-
-    def trials(self, tasks: Sequence[str], modes: Sequence[str], episodes: int) -> list[OperatorTrial]:
-        """Return those that are there, by task, mode and number."""
-        keys = [(task, mode, episode) for task in tasks for mode in modes for episode in range(episodes)]
-        return [self._trials[key] for key in keys if key in self._trials]
-
-    def _read(self) -> list[OperatorTrial]:
-        try:
-            content = read_json(self._path)
-            found = {name: content.get(name, _UNNAMED.get(name)) for name in self._head}
-            if found == self._head:
-                return [OperatorTrial(**row) for row in content["trials"]]
-        except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
-            raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error
-        raise HandrailError(f"--json {self._path}: expected {self._head}, got {found}; choose another file")
+def trials_file(config: TrialsConfig) -> Rows[OperatorTrial]:
+    """Return the file of the trials of one robot, seed, noise and number of persons."""
+    settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
+    head = {"format": FORMAT} | settings
+    return Rows(config.json, head, OperatorTrial, trial_key, SIMULATION, "trials", _UNNAMED)
 
 
-def _key(trial: OperatorTrial) -> tuple[str, str, int]:
+def trial_key(trial: OperatorTrial) -> tuple[str, str, int]:
+    """Return what tells a trial from the others of its file."""
     return trial.task, trial.mode, trial.episode
-
-
-def _rounded(trial: OperatorTrial) -> dict[str, Any]:
-    return {
-        name: round(value, _PLACES) if isinstance(value, float) else value
-        for name, value in asdict(trial).items()
-    }

@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
-from typing import cast
+from itertools import product
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,12 +27,13 @@ from handrail.scripts.bench.operators.file import (
     SLOW_MODE,
     OperatorTrial,
     TrialsConfig,
-    TrialsFile,
+    trials_file,
 )
 from handrail.scripts.bench.report import report
 
 _PRELOAD = ("handrail.scripts.bench.operators.trials",)
 _FPS = 20  # [Hz]
+_PLACES = 4  # digits that are kept
 _OF_OUTCOME = (*("success", "failure_reason", "seconds", "frames", "smallest_distance", "brakes"),)
 
 
@@ -83,21 +84,17 @@ def run_trials(
         console: to show how far it is; nothing without one.
     """
     config.check()
-    file = TrialsFile(Path(config.json).expanduser(), config)
+    file = trials_file(config)
     settings = replace(config, workers=1, ray="", json="trials.json", page="")  # what an episode depends on
-    jobs = [
-        Job(f"{task} {mode} {episode}", run_trial, (settings, task, mode, episode))
-        for task in config.task_names
-        for mode in config.mode_names
-        for episode in file.missing(task, mode, config.episodes)
-    ]
+    keys = list(product(config.task_names, config.mode_names, range(config.episodes)))
+    jobs = [Job(" ".join(map(str, key)), run_trial, (settings, *key)) for key in keys if key not in file]
     with Execution(config, "episodes", console, _PRELOAD) as execution:
         for result in execution.run(jobs):
             if result.error:
                 raise HandrailError(f"{result.job.name}: {result.error}")
             file.add(result.value)
             told(result.value)
-    return file.trials(config.task_names, config.mode_names, config.episodes)
+    return [file[key] for key in keys]
 
 
 def run_trial(config: TrialsConfig, task: str, mode: str, episode: int) -> OperatorTrial:
@@ -105,9 +102,13 @@ def run_trial(config: TrialsConfig, task: str, mode: str, episode: int) -> Opera
     person = episode % config.persons
     session, hands = _watched(config, task, mode, person)
     outcome = session.run(episode_seed(config.seed, episode))
-    went = {name: getattr(outcome, name) for name in _OF_OUTCOME} | {"contacts": outcome.contact_onsets}
-    own = {"switches": hands.switches, "switching": hands.away / _FPS}
-    return OperatorTrial(task, mode, episode, person, **went, **own)
+    went: dict[str, Any] = {name: getattr(outcome, name) for name in _OF_OUTCOME}
+    went |= {"contacts": outcome.contact_onsets}
+    went |= {"switches": hands.switches, "switching": hands.away / _FPS}
+    kept: dict[str, Any] = {
+        name: round(each, _PLACES) if isinstance(each, float) else each for name, each in went.items()
+    }
+    return OperatorTrial(task, mode, episode, person, **kept)
 
 
 @lru_cache(maxsize=16)

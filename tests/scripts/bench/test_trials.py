@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.scripts.bench.operators.file import TrialsConfig, TrialsFile
+from handrail.scripts.bench.operators.file import TrialsConfig, trials_file
 from handrail.scripts.bench.operators.trials import run_trials
 
 
@@ -56,9 +56,10 @@ def test_a_file_from_before_robots_could_be_chosen_is_of_the_ur10(config, trials
     text = Path(config.json).read_text()
     assert '"robot": "ridgeback_ur10", ' in text
     old.write_text(text.replace('"robot": "ridgeback_ur10", ', "", 1))
-    assert TrialsFile(old, config).missing("reach", "ee", 3) == []
+    file = trials_file(replace(config, json=str(old)))
+    assert all(("reach", "ee", episode) in file for episode in range(3))
     with pytest.raises(HandrailError, match="choose another file"):
-        TrialsFile(old, replace(config, robot="ridgeback_panda"))
+        trials_file(replace(config, json=str(old), robot="ridgeback_panda"))
 
 
 @pytest.mark.parametrize("wrong", [{"seed": 1}, {"noise": 2.0}, {"persons": 3}, {"robot": "ridgeback_panda"}])
@@ -72,5 +73,5 @@ def test_another_file_is_left_alone(config, tmp_path):
     for content in ("[1]", "{", '{"format": "else"}'):
         path.write_text(content)
         with pytest.raises(HandrailError, match="--json"):
-            TrialsFile(path, config)
+            trials_file(replace(config, json=str(path)))
         assert path.read_text() == content
