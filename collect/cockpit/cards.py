@@ -1,13 +1,12 @@
 """Cards that cover the page, with something to read and questions: a channel beside the driving."""
 
-import json
 import select
 import time
 from collections.abc import Mapping
 from typing import Any
 
 from handrail.collect.cockpit.messages import CardAnswer
-from handrail.collect.cockpit.pipe import ANSWER, CARD, STOP
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 
 _AGAIN = 0.5  # after which a card is shown again: the web server may have been started anew [s]
@@ -23,14 +22,13 @@ class Cards:
     """
 
     def __init__(self, server: ServerProcess) -> None:
-        self._server, self._shown, self._at = server, b"", 0.0
+        self._server, self._shown, self._at = server, {}, 0.0
 
     def show(self, card: Mapping[str, Any]) -> None:
         """Show a card instead of the one before; without an `id` it covers nothing."""
-        data = json.dumps(card).encode()
-        if data != self._shown or time.monotonic() > self._at + _AGAIN:
-            self._server.send_surely(CARD, data, (CARD,))
-            self._shown, self._at = data, time.monotonic()
+        if card != self._shown or time.monotonic() > self._at + _AGAIN:
+            self._server.pipe.send_surely(Kind.CARD, card, (Kind.CARD,))
+            self._shown, self._at = dict(card), time.monotonic()
 
     def hear(self, patience: float = 0.1) -> list[CardAnswer]:
         """Return what was answered, waiting a little for it; a STOP is left for the next episode.
@@ -40,5 +38,5 @@ class Cards:
         """
         select.select([self._server.pipe], [], [], patience)
         messages = self._server.receive()
-        self._server.unread = [each for each in messages if each[0] == STOP]
-        return [CardAnswer(**json.loads(data)) for kind, data in messages if kind == ANSWER]
+        self._server.unread = [each for each in messages if each[0] is Kind.STOP]
+        return [CardAnswer(**value) for kind, value in messages if kind is Kind.ANSWER]

@@ -5,7 +5,6 @@ waits: what the server does not take at once is dropped. When the loop is late, 
 """
 
 import io
-import json
 import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -21,19 +20,7 @@ from PIL import Image
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.disk import DiskRoom
 from handrail.collect.cockpit.episodes import EpisodeList, EpisodePoses
-from handrail.collect.cockpit.pipe import (
-    ASK,
-    DRIVE,
-    DROPPED,
-    FRAME,
-    LOST,
-    NOTE,
-    OVER,
-    PICTURE,
-    STAGE,
-    STILL,
-    STOP,
-)
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess, open_server
 from handrail.collect.cockpit.snapshot import Snapshots
 from handrail.collect.cockpit.strain import Strain
@@ -125,7 +112,7 @@ class Cockpit:
             "dropped": self._all_dropped,
             "disk": self._disk.left if self._disk else (-1, -1),
         }
-        self._server.send(FRAME, json.dumps(moment, separators=(",", ":")).encode())
+        self._server.pipe.send(Kind.FRAME, moment)
         self._acted, self._delay = now, 0.0
         return answer
 
@@ -137,7 +124,7 @@ class Cockpit:
         if frame.images and time.monotonic() > self._pictured + 0.9 * self._strain.picture_period:
             self._pictured = time.monotonic()
             for index, picture in enumerate(frame.images.values()):
-                self._server.send(PICTURE, bytes([index]) + _jpeg(picture))
+                self._server.pipe.send(Kind.PICTURE, bytes([index]) + _jpeg(picture))
 
     def end(self, outcome: Outcome) -> None:
         """Count an episode; keep its poses, if it is kept."""
@@ -156,36 +143,33 @@ class Cockpit:
         saved, succeeded = self._episodes.saved, self._episodes.succeeded
         said = {"saved": saved, "succeeded": succeeded, "folder": self._folder}
         said["next"] = list(self._next) if saved else []
-        self._server.send_surely(OVER, json.dumps(said).encode())
+        self._server.pipe.send_surely(Kind.OVER, said)
         self._server.close()
 
     @property
     def _all_dropped(self) -> dict[str, int]:
         """What was dropped or refused on the way to pages and back, by why."""
         ours = self._server.pipe.dropped
-        room = {"frames without room": ours[FRAME], "pictures without room": ours[PICTURE]}
+        room = {"frames without room": ours[Kind.FRAME], "pictures without room": ours[Kind.PICTURE]}
         return self._dropped | {why: count for why, count in room.items() if count}
 
     def _listen(self) -> None:
         """Take what the server has passed on."""
-        for kind, data in self._server.receive():
-            if kind == LOST:
-                self.person.lose()
-            elif kind == STOP:
-                self.person.ask(Ask("stop"))
-            elif kind == NOTE:
-                self._send_stage()
-            elif kind == DROPPED:
-                self._dropped = json.loads(data)
-            elif kind == DRIVE:
-                said = json.loads(data)
-                inputs = msgspec.convert(said["inputs"], Input)
-                self.person.take(inputs, said["received"], said["round_trip"])
-            elif kind in (ASK, STILL):
-                said = json.loads(data)
-                value = tuple(said["value"]) if isinstance(said["value"], list) else said["value"]
-                if said["what"] not in self._refuses:
-                    self.person.ask(Ask(said["what"], value))
+        for kind, value in self._server.receive():
+            match kind:
+                case Kind.LOST:
+                    self.person.lose()
+                case Kind.STOP:
+                    self.person.ask(Ask("stop"))
+                case Kind.NOTE:
+                    self._send_stage()
+                case Kind.DROPPED:
+                    self._dropped = value
+                case Kind.DRIVE:
+                    inputs, received, round_trip = value
+                    self.person.take(msgspec.convert(inputs, Input), received, round_trip)
+                case Kind.ASK | Kind.STILL if value["what"] not in self._refuses:
+                    self.person.ask(Ask(**value))
 
     def _send_stage(self) -> None:
         """Say what there is to draw and to choose from."""
@@ -219,7 +203,7 @@ class Cockpit:
             "scale": robot.world.scale,
             "base_size": robot.base.size if len(channels.base) else (),
         }
-        self._server.send_surely(STAGE, json.dumps(said).encode(), (STAGE,))
+        self._server.pipe.send_surely(Kind.STAGE, said, (Kind.STAGE,))
 
 
 def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], None]) -> Cockpit:

@@ -2,31 +2,18 @@
 
 import asyncio
 import contextlib
-import json
 import time
 from collections import Counter, deque
-from dataclasses import asdict, replace
+from collections.abc import Hashable
+from dataclasses import replace
+from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from handrail.collect.cockpit.lease import Lease
+from handrail.collect.cockpit.lease import RESERVED, Lease
 from handrail.collect.cockpit.messages import LEASE, CardAnswer, Drive, Message, Stop, parse, stills
-from handrail.collect.cockpit.page_socket import REPLACED, PageSocket
-from handrail.collect.cockpit.pipe import (
-    ANSWER,
-    ASK,
-    CARD,
-    DRIVE,
-    DROPPED,
-    FRAME,
-    LOST,
-    OVER,
-    PICTURE,
-    STAGE,
-    STILL,
-    STOP,
-    Pipe,
-)
+from handrail.collect.cockpit.page_socket import REPLACED, PageSocket, text
+from handrail.collect.cockpit.pipe import Kind, Pipe
 from handrail.collect.cockpit.strain import Strain
 from handrail.collect.operators.person.inputs import Ask
 from handrail.controllers.errors import HandrailError
@@ -34,7 +21,6 @@ from handrail.controllers.errors import HandrailError
 MOST_PAGES = 32
 MOST_LATE = 0.3  # for how long there may have been a newer picture than the one that an input answers [s]
 _LAST_WORDS = 0.5  # for which a page that is cut off may still say STOP [s]
-_WORDS = {STAGE: "stage", CARD: "card", OVER: "over", FRAME: "frame"}  # of the recording, for pages
 
 
 class Hub:
@@ -48,51 +34,42 @@ class Hub:
     def __init__(self, pipe: Pipe) -> None:
         self._pipe, self._lease, self.strain = pipe, Lease(), Strain()
         self._pages: set[PageSocket] = set()
-        self._kept: dict[bytes, str] = {}  # scene, card and end, as pages that come later hear them too
+        self._kept: dict[Kind, str] = {}  # scene, card and end, as pages that come later hear them too
         self._stamps: deque[float] = deque(maxlen=64)  # of the frames that pages have got
         self._presses: deque[int] = deque(maxlen=64)  # of STOP that were heard
         self._stopped = -1.0  # when it was said last [s]
-        self._was_free = True
         self.counts: Counter[str] = Counter()
 
     @property
     def is_leaving(self) -> bool:
         """Whether pages that have been told that it is over are still there: they go when they hear it."""
-        return OVER in self._kept and bool(self._pages)
+        return Kind.OVER in self._kept and bool(self._pages)
 
     def hear(self) -> None:
         """Pass on what the recording has sent."""
-        newest: dict[bytes, bytes] = {}
-        for kind, data in self._pipe.receive():
-            newest[kind + data[:1] if kind == PICTURE else kind] = data
-            if kind == FRAME:  # also one that no page gets: inputs that do not answer it may be late
-                self._stamps.append(json.loads(data)["stamp"])
-        for kind, data in newest.items():
-            word = _WORDS.get(kind)
-            said = f'{{"kind":"{word}","{word}":{data.decode()}}}' if word else data
-            if isinstance(said, str) and kind != FRAME:
+        newest: dict[Hashable, tuple[Kind, Any]] = {}
+        for kind, value in self._pipe.receive():
+            newest[kind, value[0] if kind is Kind.PICTURE else 0] = kind, value
+            if kind is Kind.FRAME:  # also one that no page gets: inputs that do not answer it may be late
+                self._stamps.append(value["stamp"])
+        for key, (kind, value) in newest.items():
+            said = value if kind is Kind.PICTURE else text(kind, **{kind: value})
+            if kind in (Kind.STAGE, Kind.CARD, Kind.OVER):
                 self._kept[kind] = said
             for page in self._pages:
                 drives = self._lease.drives(page.name)
-                if kind == FRAME:  # the driver has every one, the others some
-                    page.offer(kind, said, 0.0 if drives else 0.9 * self.strain.spectator_period)
-                elif kind in (STAGE, OVER) or (kind == CARD and drives):
+                if kind is Kind.PICTURE:
+                    page.offer(key, said, 0.9 * self.strain.picture_period)
+                elif kind is Kind.FRAME:  # the driver has every one, the others some
+                    page.offer(key, said, 0.0 if drives else 0.9 * self.strain.spectator_period)
+                elif drives or kind is not Kind.CARD:
                     page.offer(kind, said)
-                elif not word:
-                    page.offer(kind, said, 0.9 * self.strain.picture_period)
-
-    def keep_up(self) -> None:
-        """Send what waits for the recording; tell the pages when the lease has become free."""
-        self._pipe.flush()
-        if self._lease.is_free_for("") != self._was_free:
-            self._was_free = not self._was_free
-            self._tell_all()
 
     def report(self, refused: int) -> None:
         """Tell the recording what was dropped, and how many were turned away."""
         self.counts["refused at the door"] = refused
-        self.counts["input without room"] = self._pipe.dropped[DRIVE] + self._pipe.dropped[ASK]
-        self._pipe.send(DROPPED, json.dumps({why: n for why, n in self.counts.items() if n}).encode())
+        self.counts["input without room"] = self._pipe.dropped[Kind.DRIVE] + self._pipe.dropped[Kind.ASK]
+        self._pipe.send(Kind.DROPPED, {why: n for why, n in self.counts.items() if n})
 
     async def serve(self, socket: WebSocket, name: str) -> None:
         """Serve a page until it goes."""
@@ -111,8 +88,8 @@ class Hub:
         try:
             if self._lease.is_free_for(name):
                 self._lease.take(name)
-            if STAGE in self._kept:
-                page.offer(STAGE, self._kept[STAGE])
+            if Kind.STAGE in self._kept:
+                page.offer(Kind.STAGE, self._kept[Kind.STAGE])
             self._tell_all()
             await self._listen(page, delivery)
         except (WebSocketDisconnect, RuntimeError, TimeoutError):
@@ -131,6 +108,7 @@ class Hub:
             self._lose()
         self._lease.leave(page.name)
         self._tell_all()
+        asyncio.get_running_loop().call_later(1.01 * RESERVED, self._tell_all)  # others may drive then
 
     async def _listen(self, page: PageSocket, delivery: "asyncio.Task[None]") -> None:
         """Take a page's messages; one that is cut off may still say STOP."""
@@ -154,7 +132,7 @@ class Hub:
         if stops:  # anyone who sees danger may
             self._presses.extend(filter(None, presses.values()))
             self._stopped = now
-            self._pipe.send_surely(STOP, b"", (STOP, ASK))
+            self._pipe.send_surely(Kind.STOP, instead_of=(Kind.STOP, Kind.ASK))
         for number, each in enumerate(said if not page.is_cut else ()):
             may = page.may_say(now)
             try:
@@ -191,9 +169,10 @@ class Hub:
         elif isinstance(said, Ask) and said.what == "stop" and page.echo <= self._stopped:  # not yet seen
             page.say("error", error="release: expected of a page that saw the robot stopped; press it again")
         else:
-            kind = ANSWER if isinstance(said, CardAnswer) else STILL if stills(said) else ASK
-            if kind != ASK or STAGE in self._kept:
-                self._pipe.send_surely(kind, json.dumps(asdict(said)).encode())
+            kind = Kind.STILL if stills(said) else Kind.ASK
+            kind = Kind.ANSWER if isinstance(said, CardAnswer) else kind
+            if kind is not Kind.ASK or Kind.STAGE in self._kept:
+                self._pipe.send_surely(kind, said)
 
     def _drive(self, page: PageSocket, said: Drive, now: float) -> None:
         """Pass an input on; who answers an old picture cannot steer, only let go."""
@@ -208,16 +187,15 @@ class Hub:
             page.is_late = is_late
             self._tell(page)
         self.counts["input that came too late"] += is_late
-        inputs = asdict(replace(said.inputs, on=said.on and not is_late))
-        forward = json.dumps({"inputs": inputs, "received": now, "round_trip": page.round_trip}).encode()
+        forward = replace(said, on=said.on and not is_late), now, page.round_trip
         if stills(said):
-            self._pipe.send_surely(DRIVE, forward, (DRIVE,))
+            self._pipe.send_surely(Kind.DRIVE, forward, (Kind.DRIVE,))
         elif not is_late:
-            self._pipe.send(DRIVE, forward)
+            self._pipe.send(Kind.DRIVE, forward)
 
     def _lose(self) -> None:
         """Tell the recording that nobody drives now: who does next has to begin anew."""
-        self._pipe.send_surely(LOST, b"", (LOST, ASK))
+        self._pipe.send_surely(Kind.LOST, instead_of=(Kind.LOST, Kind.ASK))
 
     def _tell_all(self) -> None:
         for page in self._pages:
@@ -235,8 +213,8 @@ class Hub:
             asking=self._lease.asking == page.name,
             late=driving and page.is_late,
         )
-        if driving and CARD in self._kept:
-            page.offer(CARD, self._kept[CARD])
+        if driving and Kind.CARD in self._kept:
+            page.offer(Kind.CARD, self._kept[Kind.CARD])
 
 
 def _parsed(message: str | bytes) -> Message | HandrailError:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-_RESERVED = 5.0  # how long a page that was cut off may come back to its lease [s]
+RESERVED = 5.0  # how long a page that was cut off may come back to its lease [s]
 
 
 class Lease:
@@ -30,7 +30,7 @@ class Lease:
 
     def is_free_for(self, page: str) -> bool:
         """Whether a page may drive at once."""
-        is_reserved = self._is_there or self._clock() <= self._left_at + _RESERVED
+        is_reserved = self._is_there or self._clock() <= self._left_at + RESERVED
         return page == self.holder or not self.holder or not is_reserved
 
     def give(self, page: str) -> None:

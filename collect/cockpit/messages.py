@@ -16,23 +16,20 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from handrail.collect.operators.person.inputs import ASKS, STILLS, Ask, Input
+from handrail.collect.operators.person.inputs import ASKS, MOST, STILLS, Ask, Input
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.typed import Fraction, check, check_names, decoded
 
 LARGEST = 4096  # message [bytes]
 LEASE = ("take", "give")  # asks that concern the pages alone
 _ASKS = {**ASKS, **dict.fromkeys(LEASE, bool)}
-_MOST = 64  # values in a list
 _VALUES: Mapping[type, Any] = {
     bool: bool,
     str: Annotated[str, Meta(max_length=100)],
     float: Fraction,
-    list: Annotated[tuple[int, ...], Meta(max_length=_MOST)],
+    list: Annotated[tuple[int, ...], Meta(max_length=MOST)],
 }
 _Label = Annotated[str, Meta(max_length=200)]
-_Deflection = Annotated[float, Meta(ge=-1, le=1)]
-_Angle = Annotated[float, Meta(ge=-20, le=20)]
 
 
 @dataclass(frozen=True)
@@ -57,23 +54,13 @@ class Stop:
     press: int = 0  # a repeated message says the same number; 0 where the page counts none
 
 
-@dataclass(frozen=True)
-class Drive:
+@dataclass(frozen=True, kw_only=True)
+class Drive(Input):
     """Where the inputs of a page are, many times a second."""
 
+    device: Literal["keyboard", "gamepad", "touch", "sliders", "xr"]  # pyright: ignore[reportGeneralTypeIssues]
     seq: Annotated[int, Meta(ge=0, lt=2**53)]  # counts up
     echo: Annotated[float, Meta(ge=0, le=1e12)]  # the server's time in the newest frame on the page [s]
-    on: bool
-    device: Literal["keyboard", "gamepad", "touch", "sliders", "xr"]
-    grip: bool
-    axes: Annotated[tuple[_Deflection, ...], Meta(max_length=_MOST)]
-    view: Annotated[float, Meta(ge=-10, le=10)]  # [rad]
-    targets: Annotated[tuple[_Angle, ...], Meta(max_length=_MOST)]  # [rad]
-
-    @property
-    def inputs(self) -> Input:
-        """The inputs as an operator takes them."""
-        return Input(self.on, self.device, self.grip, self.axes, self.view, self.targets)
 
 
 Message = Drive | Ask | CardAnswer | Stop
@@ -82,7 +69,7 @@ Message = Drive | Ask | CardAnswer | Stop
 def stills(said: Message) -> bool:
     """Whether a message takes motion away: all is let go, or the robot is left at rest."""
     if isinstance(said, Drive):
-        return not said.on or said.inputs.is_let_go
+        return not said.on or said.is_let_go
     return isinstance(said, Stop) or (isinstance(said, Ask) and (said.what in STILLS or said.what == "give"))
 
 

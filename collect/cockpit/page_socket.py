@@ -1,9 +1,10 @@
 """A connected page: gets what is newest of each kind, when it takes it; says a few messages at a time."""
 
 import asyncio
-import json
 import time
+from collections.abc import Hashable
 
+import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 SLOW = 10.0  # time in which a page must take what it is sent [s]
@@ -34,8 +35,8 @@ class PageSocket:
         self.sequence, self.echo, self.round_trip, self.is_late = -1, 0.0, 0.0, False
         self.bad = self.too_fast = 0
         self._allowance, self._before = _MOST_MESSAGES, 0.0
-        self._newest: dict[bytes | str, str | bytes] = {}
-        self._next: dict[bytes | str, float] = {}
+        self._newest: dict[Hashable, str | bytes] = {}
+        self._next: dict[Hashable, float] = {}
         self._waiting = asyncio.Event()
         self._coming = asyncio.ensure_future(socket.receive())
 
@@ -75,7 +76,7 @@ class PageSocket:
         """Hear no more."""
         self._coming.cancel()
 
-    def offer(self, kind: bytes | str, data: str | bytes, period: float = 0.0) -> None:
+    def offer(self, kind: Hashable, data: str | bytes, period: float = 0.0) -> None:
         """Let it have a message instead of an older one of its kind that still waits, one a period [s]."""
         now = time.monotonic()
         if not period or now >= self._next.get(kind, 0.0):
@@ -85,7 +86,7 @@ class PageSocket:
 
     def say(self, kind: str, **words: object) -> None:
         """Let it have a small message."""
-        self.offer(kind, json.dumps({"kind": kind, **words}))
+        self.offer(kind, text(kind, **words))
 
     def answered(self, echo: float, now: float) -> None:
         """Take note of which time of the server it answers; the first answer to each one counts."""
@@ -106,3 +107,8 @@ class PageSocket:
                 data = self._newest.pop(kind)
                 send = self.socket.send_bytes if isinstance(data, bytes) else self.socket.send_text
                 await asyncio.wait_for(send(data), SLOW)  # pyright: ignore[reportArgumentType]
+
+
+def text(kind: str, **words: object) -> str:
+    """Return a message as a page reads it."""
+    return msgspec.json.encode({"kind": kind, **words}).decode()

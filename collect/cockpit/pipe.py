@@ -8,6 +8,10 @@ What takes motion away is never dropped, and goes first.
 import socket
 from collections import Counter, deque
 from collections.abc import Collection
+from enum import StrEnum
+from typing import Any
+
+import msgspec
 
 from handrail.controllers.errors import HandrailError
 
@@ -17,24 +21,36 @@ _BUFFER = 2**20  # asked for; the system may give less [bytes]
 _MOST_WAITING = 64  # messages
 _MORE, _LAST = b"+", b"."
 
-# from the recording, and from the server
-FRAME, PICTURE, STAGE, CARD, OVER = b"F", b"P", b"S", b"Q", b"O"
-NOTE, DRIVE, ASK, STILL, STOP, LOST, DROPPED, ANSWER = b"N", b"D", b"A", b"a", b"!", b"L", b"-", b"R"
-_STILL = (STOP, LOST, STILL, DRIVE)  # what takes motion away: inputs only wait where all is let go
+
+class Kind(StrEnum):
+    """What a message is: of the recording, as pages are told it, and of the server."""
+
+    FRAME, PICTURE, STAGE, CARD, OVER = "frame", "picture", "stage", "card", "over"
+    NOTE, DRIVE, ASK, STILL, STOP = "note", "drive", "ask", "still", "stop"
+    LOST, DROPPED, ANSWER = "lost", "dropped", "answer"
+
+
+Message = tuple[Kind, Any]
+"""A kind, and a value of JSON or bytes."""
+_STILL = (Kind.STOP, Kind.LOST, Kind.STILL, Kind.DRIVE)  # inputs only wait where all is let go
+_DECODER = msgspec.msgpack.Decoder(Message)
 
 
 class Pipe:
-    """One end of a connected socket pair that keeps packets apart."""
+    """One end of a connected socket pair that keeps packets apart.
+
+    To send to an end that is gone does nothing: `receive` finds out.
+    """
 
     def __init__(self, end: socket.socket) -> None:
         end.setblocking(False)
         for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
             end.setsockopt(socket.SOL_SOCKET, option, _BUFFER)
         self._socket = end
-        self.dropped = Counter[bytes]()
+        self.dropped = Counter[Kind]()
         """Messages for which there was no room, by kind."""
         self._begun = deque[bytes]()  # packets of a message whose first one is gone
-        self._waiting = deque[tuple[bytes, bytes]]()
+        self._waiting = deque[tuple[Kind, bytes]]()
         self._parts: list[bytes] = []  # of a message that comes in
 
     @staticmethod
@@ -46,31 +62,32 @@ class Pipe:
         """Return the file descriptor, for a loop that waits."""
         return self._socket.fileno()
 
-    def send(self, kind: bytes, data: bytes) -> bool:
+    def send(self, kind: Kind, value: Any = None) -> bool:
         """Send a message if there is room for it now; return whether there was."""
-        went = self.flush() and len(data) <= LARGEST and self._begin(kind, data)
+        data = _encoded(kind, value)
+        went = self.flush() and len(data) <= LARGEST and self._begin(data)
         self.dropped[kind] += not went
-        if went:
-            self.flush()
+        self.flush()
         return went
 
-    def send_surely(self, kind: bytes, data: bytes, instead_of: Collection[bytes] = ()) -> None:
+    def send_surely(self, kind: Kind, value: Any = None, instead_of: Collection[Kind] = ()) -> None:
         """Send a message, later if there is no room now.
 
         Of too many that wait the last ones are dropped, but none that takes motion away: it waits once.
 
         Args:
             kind: of the message.
-            data: content of the message.
+            value: content of the message.
             instead_of: kinds that are out of date with it: those that wait are dropped.
         """
-        for each in [each for each in self._waiting if each[0] in instead_of or each == (kind, data)]:
+        message = kind, _encoded(kind, value)
+        for each in [each for each in self._waiting if each[0] in instead_of or each == message]:
             self._waiting.remove(each)
         is_full = len(self._waiting) >= _MOST_WAITING and kind not in _STILL
-        if is_full or len(data) > LARGEST:
+        if is_full or len(message[1]) > LARGEST:
             self.dropped[kind] += 1
             return
-        (self._waiting.appendleft if kind == STOP else self._waiting.append)((kind, data))
+        (self._waiting.appendleft if kind is Kind.STOP else self._waiting.append)(message)
         self.flush()
 
     def flush(self) -> bool:
@@ -80,41 +97,40 @@ class Pipe:
                 if not self._push(self._begun[0]):
                     return False
                 self._begun.popleft()
-            elif self._begin(*self._waiting[0]):
+            elif self._begin(self._waiting[0][1]):
                 self._waiting.popleft()
             else:
                 return False
         return True
 
-    def receive(self) -> list[tuple[bytes, bytes]]:
+    def receive(self) -> list[Message]:
         """Return all messages that have come, the oldest first."""
-        messages: list[tuple[bytes, bytes]] = []
+        messages: list[Message] = []
         try:
             while packet := self._socket.recv(2 * _PACKET):
-                self._parts.append(packet[2:])
-                if packet[1:2] == _LAST:
-                    messages.append((packet[:1], b"".join(self._parts)))
+                self._parts.append(packet[1:])
+                if packet[:1] == _LAST:
+                    messages.append(_DECODER.decode(b"".join(self._parts)))
                     self._parts.clear()
         except BlockingIOError:
             return messages
-        except OSError as error:
-            raise _gone() from error
-        if messages:
-            return messages
-        raise _gone()
+        except OSError:
+            messages.clear()
+        if not messages:
+            raise HandrailError("cockpit: the other end of the pipe is gone")
+        return messages
 
     def close(self) -> None:
         """Close it."""
         self._socket.close()
 
-    def _begin(self, kind: bytes, data: bytes) -> bool:
+    def _begin(self, data: bytes) -> bool:
         """Send a message's first packet; the others follow as there is room."""
-        starts = range(0, max(len(data), 1), _PACKET)
-        ends = [_MORE] * (len(starts) - 1) + [_LAST]
-        if not self._push(kind + ends[0] + data[:_PACKET]):
+        chunks = [data[start : start + _PACKET] for start in range(0, len(data), _PACKET)]
+        first, *rest = [_MORE + chunk for chunk in chunks[:-1]] + [_LAST + chunks[-1]]
+        if not self._push(first):
             return False
-        rest = zip(starts[1:], ends[1:], strict=True)
-        self._begun.extend(kind + end + data[start : start + _PACKET] for start, end in rest)
+        self._begun.extend(rest)
         return True
 
     def _push(self, packet: bytes) -> bool:
@@ -122,10 +138,10 @@ class Pipe:
             self._socket.send(packet)
         except BlockingIOError:
             return False
-        except OSError as error:
-            raise _gone() from error
+        except OSError:
+            pass  # the other end is gone
         return True
 
 
-def _gone() -> HandrailError:
-    return HandrailError("cockpit: the other end of the pipe is gone")
+def _encoded(kind: Kind, value: Any) -> bytes:
+    return msgspec.msgpack.encode((kind, value), enc_hook=float)

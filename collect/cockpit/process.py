@@ -9,12 +9,12 @@ import tempfile
 import time
 import webbrowser
 from collections import deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from handrail.collect.cockpit.pipe import LOST, NOTE, Pipe
+from handrail.collect.cockpit.pipe import Kind, Message, Pipe
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
@@ -44,7 +44,7 @@ class ServerProcess:
         self._folder = tempfile.TemporaryDirectory(prefix="handrail-cockpit-", ignore_cleanup_errors=True)
         self._settings = asdict(config) | {"folder": self._folder.name, "secret": secrets.token_urlsafe(32)}
         self._say, self._deaths = say, deque[float](maxlen=MOST_DEATHS)
-        self.unread: list[tuple[bytes, bytes]] = []
+        self.unread: list[Message] = []
         self.address = ""
         self._start()
         try:
@@ -63,18 +63,7 @@ class ServerProcess:
         """Take a file away from the server."""
         (Path(self._folder.name) / name).unlink(missing_ok=True)
 
-    def send(self, kind: bytes, data: bytes) -> bool:
-        """Send a message if there is room for it, and a server; return whether there was."""
-        with suppress(HandrailError):  # `receive` finds out
-            return self.pipe.send(kind, data)
-        return False
-
-    def send_surely(self, kind: bytes, data: bytes, instead_of: Collection[bytes] = ()) -> None:
-        """Send a message, later if there is no room now; a server that has died hears it no more."""
-        with suppress(HandrailError):
-            self.pipe.send_surely(kind, data, instead_of)
-
-    def receive(self) -> list[tuple[bytes, bytes]]:
+    def receive(self) -> list[Message]:
         """Return what the server has passed on: `LOST` when it died, `NOTE` when another one has begun."""
         try:
             messages = self.unread + self.pipe.receive()
@@ -82,18 +71,17 @@ class ServerProcess:
             self.pipe.flush()
         except HandrailError:
             self._start_again()
-            return [(LOST, b"")]
-        for kind, data in messages:
-            if kind == NOTE:
-                self._take(data)
+            return [(Kind.LOST, None)]
+        for kind, value in messages:
+            if kind is Kind.NOTE:
+                self._take(**value)
         return messages
 
     def close(self) -> None:
         """Let the server have what waits for it, and end it: it tells its pages, then goes by itself."""
         until = time.monotonic() + _LAST_WORDS
-        with suppress(HandrailError):
-            while not self.pipe.flush() and time.monotonic() < until:
-                time.sleep(0.01)
+        while not self.pipe.flush() and time.monotonic() < until:
+            time.sleep(0.01)
         self.pipe.close()
         self._end(_END)
         self._folder.cleanup()
@@ -134,14 +122,13 @@ class ServerProcess:
             self.process.kill()
             return self.process.wait()
 
-    def _take(self, note: bytes) -> None:
+    def _take(self, address: str = "", port: int = 0, error: str = "") -> None:
         """Take where the server listens."""
-        said = json.loads(note)
-        if "error" in said:
-            raise HandrailError(said["error"])
-        if self.address and self.address != said["address"]:
-            self._say(f"Drive at {said['address']}")
-        self.address, self._settings["port"] = said["address"], said["port"]
+        if error:
+            raise HandrailError(error)
+        if self.address and self.address != address:
+            self._say(f"Drive at {address}")
+        self.address, self._settings["port"] = address, port
 
     def _wait(self) -> None:
         until = time.monotonic() + _BEGIN
@@ -149,9 +136,9 @@ class ServerProcess:
             if time.monotonic() > until:
                 raise HandrailError(f"cockpit: the web server did not start within {_BEGIN:.0f} s")
             time.sleep(0.02)
-            for kind, data in self.pipe.receive():
-                if kind == NOTE:
-                    self._take(data)
+            for kind, value in self.pipe.receive():
+                if kind is Kind.NOTE:
+                    self._take(**value)
 
 
 def open_server(config: CockpitConfig, say: Callable[[str], None]) -> ServerProcess:

@@ -13,7 +13,6 @@ import shutil
 import socket
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from handrail.collect.cockpit.guard import COOKIE, Guard
 from handrail.collect.cockpit.http import Http
 from handrail.collect.cockpit.hub import Hub
 from handrail.collect.cockpit.messages import LARGEST
-from handrail.collect.cockpit.pipe import NOTE, Pipe
+from handrail.collect.cockpit.pipe import Kind, Pipe
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
@@ -166,19 +165,18 @@ async def serve(pipe: Pipe, config: CockpitConfig, folder: Path, secret: str) ->
     door = f"#{guard.token}" if config.asks else ""
     shown = f"[{host}]" if ":" in host else host
     note = {"address": f"{scheme}://{shown}:{port}/{door}", "port": port}
-    pipe.send_surely(NOTE, json.dumps(note).encode())
+    pipe.send_surely(Kind.NOTE, note)
     gone, loop = asyncio.Event(), asyncio.get_running_loop()
 
-    def noticing(act: Callable[[], None]) -> None:
-        """Act, and notice when the recording is gone."""
+    def hear() -> None:
         try:
-            act()
-        except HandrailError:
+            hub.hear()
+        except HandrailError:  # the recording is gone
             gone.set()
             loop.remove_reader(pipe.fileno())
 
-    loop.add_reader(pipe.fileno(), noticing, hub.hear)
-    beside = [asyncio.create_task(task) for task in (_note(noticing, hub, guard), _end(server, gone, hub))]
+    loop.add_reader(pipe.fileno(), hear)
+    beside = [asyncio.create_task(task) for task in (_note(pipe, hub, guard), _end(server, gone, hub))]
     await server.serve(sockets=[listener])
     for task in beside:
         task.cancel()
@@ -220,7 +218,7 @@ async def _end(server: uvicorn.Server, gone: asyncio.Event, hub: Hub) -> None:
     server.should_exit = True
 
 
-async def _note(noticing: Callable[[Callable[[], None]], None], hub: Hub, guard: Guard) -> None:
+async def _note(pipe: Pipe, hub: Hub, guard: Guard) -> None:
     """Look again and again how late the loop is; send what waits for the recording; give memory back.
 
     A TLS connection that is gone is 256 KiB of garbage in a cycle: too few objects for Python to look soon.
@@ -230,9 +228,9 @@ async def _note(noticing: Callable[[Callable[[], None]], None], hub: Hub, guard:
         before = time.monotonic()
         await asyncio.sleep(_NOTES)
         hub.strain.note(time.monotonic() - before - _NOTES)
-        noticing(hub.keep_up)
+        pipe.flush()
         if turn % _REPORTS == 0:
-            noticing(lambda: hub.report(guard.refused))
+            hub.report(guard.refused)
         if turn % _COLLECTIONS == 0:
             gc.collect()
 
@@ -253,8 +251,7 @@ def main() -> None:
             return  # the recording is still there
         shutil.rmtree(folder, ignore_errors=True)
     except HandrailError as error:
-        with contextlib.suppress(HandrailError):
-            pipe.send_surely(NOTE, json.dumps({"error": str(error)}).encode())
+        pipe.send_surely(Kind.NOTE, {"error": str(error)})
 
 
 if __name__ == "__main__":

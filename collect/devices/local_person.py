@@ -147,7 +147,7 @@ class LocalPerson:
             on = on and HOLD in main.deflections
         names = self._person.meaning.channels.names
         axes = tuple(float(np.clip(other.deflections.get(name, 0.0), -1.0, 1.0)) for name in names)
-        inputs = Input(on, self._main.device.name, self._grip, axes, targets=targets)
+        inputs = Input(on, self._main.device.name, self._grip, axes, 0.0, targets)
         self._person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
 
     def _do(self, action: str) -> None:

@@ -38,7 +38,7 @@ class Rehearsal:
         if isinstance(now, EpisodeEvent):
             return now
         axes = (_DEFLECTION,) * self._meaning.channels.size
-        return self._meaning.intent(Input(True, "rehearsal", False, axes), now, view.state)
+        return self._meaning.intent(Input(True, "rehearsal", False, axes, 0.0, ()), now, view.state)
 
     def _all(self) -> Iterator[Setting | EpisodeEvent]:
         for mode in self._modes:

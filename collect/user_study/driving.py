@@ -4,7 +4,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 
 from handrail.collect.cockpit.cockpit import Cockpit
-from handrail.collect.cockpit.pipe import STOP
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
 from handrail.collect.operators.person.person import Phase
@@ -56,7 +56,7 @@ class Driving:
         modes, channels = build_modes(config, env), Channels.of(env.model.description)
         offered = study.modes if "mode" in study.allow else (mode,)
         if self._cockpit and self._cockpit.person.phase is Phase.STOPPED:
-            self._server.unread.append((STOP, b""))  # a STOP holds until somebody releases it
+            self._server.unread.append((Kind.STOP, None))  # a STOP holds until somebody releases it
         refuses = frozenset(ALLOWED) - frozenset(study.allow) | {"practice"}
         self._cockpit = Cockpit(
             env.model, {name: modes[name] for name in offered}, mode, self._server, refuses

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from handrail.collect.cockpit.pipe import FRAME, STAGE
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.cockpit_config import CockpitConfig
 
@@ -67,7 +67,7 @@ def drive(sequence=1, echo=None, axes=(0.0,) * 18, **changes):
 
 def show(served, **frame):
     """Let the recording show a frame, or what there is to draw."""
-    served.pipe.send(FRAME, json.dumps({"stamp": time.monotonic(), **frame}).encode())
+    served.pipe.send(Kind.FRAME, {"stamp": time.monotonic(), **frame})
 
 
 def seen(served, socket, n):
@@ -82,7 +82,7 @@ def seen(served, socket, n):
 
 def stage(served):
     """Let the recording say what there is to draw."""
-    served.pipe.send(STAGE, json.dumps({"robot": "r"}).encode())
+    served.pipe.send(Kind.STAGE, {"robot": "r"})
 
 
 def heard(served, kinds, count=1, patience=60.0):

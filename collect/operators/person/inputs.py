@@ -2,7 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
+
+MOST = 64  # values in a list
+_Deflection = Annotated[float, Meta(ge=-1, le=1)]
+_Angle = Annotated[float, Meta(ge=-20, le=20)]
 
 
 @dataclass(frozen=True)
@@ -12,9 +18,9 @@ class Input:
     on: bool  # whether somebody holds the dead-man, and is there: a page seen, a device connected
     device: str  # what is moved
     grip: bool  # whether the gripper shall be closed
-    axes: tuple[float, ...]  # deflection of each channel, from −1 to 1, (m,)
-    view: float = 0.0  # from where the person looks, about the vertical [rad]
-    targets: tuple[float, ...] = ()
+    axes: Annotated[tuple[_Deflection, ...], Meta(max_length=MOST)]  # deflection of each channel, (m,)
+    view: Annotated[float, Meta(ge=-10, le=10)]  # from where the person looks, about the vertical [rad]
+    targets: Annotated[tuple[_Angle, ...], Meta(max_length=MOST)]
     """Where the arm's joints shall go, as a leader arm or sliders say it [rad]; empty while let go."""
 
     @property

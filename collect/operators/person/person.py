@@ -114,7 +114,7 @@ class Person:
                 self.practises = value
             case "mode" if value in self.modes and value != setting.mode.name:
                 self.setting = setting.switched(mode=self.modes[value])
-            case "mask" if isinstance(value, tuple):
+            case "mask":
                 bits = "".join("01"[index in value] for index in range(channels.size))
                 mode = mode_of_mask(bits, channels)
                 self.setting = setting if mode.name == setting.mode.name else setting.switched(mode=mode)
@@ -124,8 +124,8 @@ class Person:
                 self.setting = replace(setting, frame=value)
             case "speed":
                 self.setting = replace(setting, speed=max(value, 0.05))
-            case "lock" if isinstance(value, tuple):
-                locked = sorted({joint for joint in value if 0 <= joint < len(channels.joints)})
+            case "lock":
+                locked = sorted(set(value) & set(range(len(channels.joints))))
                 self.setting = setting.switched(locked=tuple(locked))
 
     def act(self, view: View) -> Intent | EpisodeEvent:

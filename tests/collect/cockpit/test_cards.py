@@ -8,7 +8,7 @@ from cockpit_helpers import drive, heard, heard_by, page, server, stage, told
 
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.cockpit.messages import CardAnswer
-from handrail.collect.cockpit.pipe import ANSWER, STOP
+from handrail.collect.cockpit.pipe import Kind
 
 CARD = {"id": "ee/tlx", "title": "How was it?", "answers": {"mental": 40}}
 
@@ -45,8 +45,8 @@ def test_only_the_page_that_drives_sees_a_card_and_answers(served):
         assert quiet(second, "card")
         second.send(said(value=99))
         first.send(said(value=45))
-        assert [json.loads(data)["value"] for _, data in heard(served, {ANSWER})] == [45]
-        assert not heard(served, {ANSWER}, patience=0.3)
+        assert [data["value"] for _, data in heard(served, {Kind.ANSWER})] == [45]
+        assert not heard(served, {Kind.ANSWER}, patience=0.3)
         first.send(json.dumps({"kind": "ask", "what": "give", "value": True}))
     with page(served, "page-number-one") as again:
         assert told(again, "card")["card"] == CARD
@@ -74,8 +74,8 @@ def test_a_stop_between_episodes_is_left_for_the_next_one(served):
         while not cards.hear():
             pass
         cards.hear(0.0)
-        assert heard_by(served, {STOP}) == [STOP]
-        assert not heard_by(served, {STOP}, patience=0.1)
+        assert heard_by(served, {Kind.STOP}) == [Kind.STOP]
+        assert not heard_by(served, {Kind.STOP}, patience=0.1)
 
 
 def test_a_card_that_nobody_acknowledges_is_shown_again(served):

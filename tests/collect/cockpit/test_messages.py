@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handrail.collect.cockpit.messages import LARGEST, CardAnswer, Drive, parse
-from handrail.collect.operators.person.inputs import Ask, Input
+from handrail.collect.operators.person.inputs import Ask
 from handrail.controllers.errors import HandrailError
 
 GOOD = {
@@ -40,7 +40,8 @@ def test_a_drive_and_an_ask():
     drive = parse(said())
     assert isinstance(drive, Drive)
     assert (drive.seq, drive.echo) == (3, 1.5)
-    assert drive.inputs == Input(True, "keyboard", False, (0.0, 1.0), 0.3, (3.0,))
+    assert (drive.on, drive.device, drive.grip, drive.axes) == (True, "keyboard", False, (0.0, 1.0))
+    assert (drive.view, drive.targets) == (0.3, (3.0,))
     assert parse('{"kind": "ask", "what": "mode", "value": "ee"}') == Ask("mode", "ee")
     assert parse('{"kind": "ask", "what": "lock", "value": [1, 2]}') == Ask("lock", (1, 2))
 

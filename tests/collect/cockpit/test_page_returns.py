@@ -13,7 +13,7 @@ from page_driver import SLOW, PageDriver
 from page_recording import is_smooth, is_whole, recording, saved
 from playwright.sync_api import expect
 
-from handrail.collect.cockpit.pipe import STOP
+from handrail.collect.cockpit.pipe import Kind
 
 pytestmark = pytest.mark.slow
 
@@ -88,7 +88,7 @@ def test_the_page_says_stop_until_it_is_so(new_page):
             while len(said) < before + 3:
                 assert time.monotonic() < end, said
                 page.wait_for_timeout(100)
-        assert heard(served, {STOP}, 2, patience=1.0) == [(STOP, b"")]
+        assert heard(served, {Kind.STOP}, 2, patience=1.0) == [(Kind.STOP, None)]
         show(served, phase="stopped")
         page.wait_for_timeout(1000)
         before = len(said)

@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from handrail.collect.cockpit.hub import MOST_LATE
 from handrail.collect.cockpit.page_socket import REPLACED
-from handrail.collect.cockpit.pipe import ASK, DRIVE, DROPPED, LOST, NOTE, STOP
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import MOST_DEATHS
 from handrail.controllers.errors import HandrailError
 
@@ -45,12 +45,12 @@ def test_a_page_drives_with_one_clock(served):
         told(socket, "stage")
         stamp = seen(served, socket, 1)
         socket.send(drive(7, stamp, axes=[0.5] * 18))
-        ((_, data),) = heard(served, {DRIVE})
-        said = json.loads(data)
-        assert said["inputs"]["axes"] == [0.5] * 18
-        assert 0.0 < said["round_trip"] < 5.0
-        assert said["received"] == pytest.approx(stamp + said["round_trip"], abs=1e-6)
-    assert heard(served, {LOST})
+        ((_, data),) = heard(served, {Kind.DRIVE})
+        inputs, received, round_trip = data
+        assert inputs["axes"] == [0.5] * 18
+        assert 0.0 < round_trip < 5.0
+        assert received == pytest.approx(stamp + round_trip, abs=1e-6)
+    assert heard(served, {Kind.LOST})
 
 
 def test_a_page_that_watches_moves_nothing_but_may_stop(served):
@@ -61,14 +61,14 @@ def test_a_page_that_watches_moves_nothing_but_may_stop(served):
         second.send(json.dumps({"kind": "ask", "what": "mode", "value": "direct"}))
         second.send(json.dumps({"kind": "ask", "what": "stop", "value": False}))
         second.send(json.dumps({"kind": "ask", "what": "stop", "value": True}))
-        assert [kind for kind, _ in heard(served, {ASK, DRIVE, STOP})] == [STOP]
+        assert [kind for kind, _ in heard(served, {Kind.ASK, Kind.DRIVE, Kind.STOP})] == [Kind.STOP]
         second.send(json.dumps({"kind": "ask", "what": "take", "value": True}))
         while not told(first, "you")["asked"]:
             pass
         first.send(json.dumps({"kind": "ask", "what": "give", "value": True}))
         while not told(second, "you")["driving"]:
             pass
-        assert heard(served, {LOST})  # whoever drives anew lets go first
+        assert heard(served, {Kind.LOST})  # whoever drives anew lets go first
 
 
 def test_a_slow_page_gets_what_is_newest(served):
@@ -94,7 +94,7 @@ def steered(served, socket, sequence, patience=60.0):
         socket.send(json.dumps({"kind": "ask", "what": "take", "value": True}))
         stamp = seen(served, socket, sequence)
         socket.send(drive(sequence, stamp, axes=[0.5] * 18))
-        if heard(served, {DRIVE}, patience=1.0):
+        if heard(served, {Kind.DRIVE}, patience=1.0):
             return stamp, sequence
     raise TimeoutError
 
@@ -108,8 +108,8 @@ def test_who_answers_an_old_picture_does_not_steer(served):
             socket.send(drive(sequence + number, old, axes=[1.0] * 18))
         while not told(socket, "you")["late"]:
             pass
-        late = heard(served, {DRIVE}, 3, patience=0.5)
-        assert all(json.loads(data)["inputs"]["axes"][0] != 1.0 for _, data in late)
+        late = heard(served, {Kind.DRIVE}, 3, patience=0.5)
+        assert all(data[0]["axes"][0] != 1.0 for _, data in late)
         steered(served, socket, sequence + 3)
         while told(socket, "you")["late"]:
             pass
@@ -122,19 +122,19 @@ def test_a_round_trip_is_the_first_answer_to_a_frame(served):
         for sequence in (1, 2):
             socket.send(drive(sequence, stamp))
             time.sleep(0.05)
-        first, second = (json.loads(data) for _, data in heard(served, {DRIVE}, 2))
-        assert first["round_trip"] == second["round_trip"] == pytest.approx(first["received"] - stamp)
-        assert second["received"] > first["received"]
+        (_, first, trip), (_, second, again) = (data for _, data in heard(served, {Kind.DRIVE}, 2))
+        assert trip == again == pytest.approx(first - stamp)
+        assert second > first
 
 
 def test_what_was_sent_before_is_refused(served):
     with page(served, "page-number-one") as socket:
         told(socket, "stage")
         socket.send(drive(5))
-        assert heard(served, {DRIVE})
+        assert heard(served, {Kind.DRIVE})
         socket.send(drive(5, axes=[1.0] * 18))
         assert "seq" in told(socket, "error")["error"]
-        assert [kind for kind, _ in heard(served, {DRIVE, LOST})] == [LOST]
+        assert [kind for kind, _ in heard(served, {Kind.DRIVE, Kind.LOST})] == [Kind.LOST]
 
 
 def test_a_copy_of_the_tab_takes_its_place(served):
@@ -144,9 +144,9 @@ def test_a_copy_of_the_tab_takes_its_place(served):
         with pytest.raises(ConnectionClosed) as closed:
             told(first, "no such thing")
         assert closed.value.rcvd.code == REPLACED
-        assert heard(served, {LOST})
+        assert heard(served, {Kind.LOST})
         second.send(drive(1))
-        assert heard(served, {DRIVE})
+        assert heard(served, {Kind.DRIVE})
 
 
 def test_what_was_dropped_is_told(served):
@@ -154,7 +154,7 @@ def test_what_was_dropped_is_told(served):
         told(socket, "stage")
         socket.send("nonsense")
         why = "messages that make no sense"
-        while why not in json.loads(heard(served, {DROPPED})[0][1]):
+        while why not in heard(served, {Kind.DROPPED})[0][1]:
             pass
 
 
@@ -241,8 +241,8 @@ def test_a_server_that_dies_is_started_again_at_its_address():
         address, before = made.address, made.process.pid
         made.process.kill()
         made.process.wait()
-        kinds = heard_by(made, {LOST, NOTE}, 2)
-        assert kinds == [LOST, NOTE]
+        kinds = heard_by(made, {Kind.LOST, Kind.NOTE}, 2)
+        assert kinds == [Kind.LOST, Kind.NOTE]
         assert (made.address, len(said)) == (address, 1)
         assert made.process.pid != before
         stage(made)
@@ -272,7 +272,7 @@ def test_a_session_outlives_the_server(tmp_path, monkeypatch):
         cookie = ask(made, "/login", token.encode())[1]["set-cookie"].split(";")[0]
         made.process.kill()
         made.process.wait()
-        heard_by(made, {NOTE})
+        heard_by(made, {Kind.NOTE})
         assert made.address.endswith(token)
         with page(made, cookie=cookie) as socket:
             told(socket, "you")

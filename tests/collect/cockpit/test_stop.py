@@ -7,12 +7,13 @@ import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import msgspec
 import numpy as np
 import pytest
 from cockpit_helpers import ask_for, drive, page, seen, server, show, stage, told
 
 from handrail.collect.cockpit.hub import Hub
-from handrail.collect.cockpit.pipe import ASK, DRIVE, FRAME, LOST, STAGE, STILL, STOP, Pipe
+from handrail.collect.cockpit.pipe import Kind, Pipe
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import STILLS, Ask, Input
@@ -56,7 +57,7 @@ def ends():
 @pytest.fixture
 def hub(ends):
     recording, web = ends
-    recording.send(STAGE, b"{}")
+    recording.send(Kind.STAGE, {})
     made = Hub(web)
     made.hear()
     return made
@@ -98,17 +99,15 @@ class Robot:
     def moves(self):
         """Obey what has come; return whether the robot is asked to move."""
         for kind, data in self._pipe.receive():
-            said = json.loads(data) if data else {}
-            if kind == STOP:
+            if kind == Kind.STOP:
                 self.person.ask(Ask("stop"))
-            elif kind == LOST:
+            elif kind == Kind.LOST:
                 self.person.lose()
-            elif kind == DRIVE:
-                lists = {name: tuple(said["inputs"][name]) for name in ("axes", "targets")}
-                self._now = said["received"]
-                self.person.take(Input(**(said["inputs"] | lists)), said["received"])
-            elif kind in (ASK, STILL):
-                self.person.ask(Ask(said["what"], said["value"]))
+            elif kind == Kind.DRIVE:
+                inputs, self._now, _ = data
+                self.person.take(msgspec.convert(inputs, Input), self._now)
+            elif kind in (Kind.ASK, Kind.STILL):
+                self.person.ask(Ask(**data))
         answer = self.person.act(self._view)
         return not isinstance(answer, EpisodeEvent) and bool(answer.values.any())
 
@@ -117,7 +116,7 @@ def stalled(recording, seconds=5.0, rate=40.0):
     """Return what a page has said while the web server stood still; the recording went on all the time."""
     now = time.monotonic()
     for moment in np.arange(now - seconds, now, 0.05):
-        recording.send(FRAME, json.dumps({"stamp": moment}).encode())
+        recording.send(Kind.FRAME, {"stamp": moment})
     return [drive(n, now - seconds, HELD) for n in range(int(seconds * rate))]
 
 
@@ -135,7 +134,7 @@ def test_what_is_queued_over_a_stall_does_not_steer(hub, ends):
     """Without a STOP, too: it answers pictures of before."""
     now = time.monotonic()
     serve(hub, QueuedSocket([*stalled(ends[0], 3.0), drive(1000, now), drive(1001, now, [0.5] * 18)]))
-    axes = [json.loads(data)["inputs"]["axes"][0] for kind, data in ends[0].receive() if kind == DRIVE]
+    axes = [data[0]["axes"][0] for kind, data in ends[0].receive() if kind == Kind.DRIVE]
     assert axes == [0.0, 0.5]
 
 
@@ -147,8 +146,8 @@ def test_stop_is_heard_before_what_is_queued_in_front_of_it(hub, ends, before):
     burst = [drive(n, now, HELD) if n % 2 else ask_for(before, value) for n in range(BURST - 1)]
     serve(hub, QueuedSocket([*burst, ask_for("stop")]))
     kinds = [kind for kind, _ in ends[0].receive()]
-    assert kinds[0] == STOP
-    assert set(kinds) <= {STOP, LOST}
+    assert kinds[0] == Kind.STOP
+    assert set(kinds) <= {Kind.STOP, Kind.LOST}
 
 
 @pytest.mark.parametrize("what", sorted(STILLS))
@@ -156,14 +155,14 @@ def test_an_end_or_a_pause_is_never_too_much(hub, ends, what):
     now = time.monotonic()
     burst = [drive(n, now, HELD) for n in range(BURST)]
     serve(hub, QueuedSocket([*burst, ask_for(what), ask_for("start")]))
-    said = [json.loads(data)["what"] for kind, data in ends[0].receive() if kind in (ASK, STILL)]
+    said = [data["what"] for kind, data in ends[0].receive() if kind in (Kind.ASK, Kind.STILL)]
     assert said == [what]
 
 
 def test_letting_go_is_never_too_much(hub, ends):
     now = time.monotonic()
     serve(hub, QueuedSocket([*(drive(n, now, HELD) for n in range(BURST)), drive(BURST, now)]))
-    inputs = [json.loads(data)["inputs"] for kind, data in ends[0].receive() if kind == DRIVE]
+    inputs = [data[0] for kind, data in ends[0].receive() if kind == Kind.DRIVE]
     assert len(inputs) < BURST / 2
     assert not any(inputs[-1]["axes"])
 
@@ -171,7 +170,7 @@ def test_letting_go_is_never_too_much(hub, ends):
 def test_who_answers_an_old_picture_still_lets_go(hub, ends):
     stale = stalled(ends[0])
     serve(hub, QueuedSocket([*stale, drive(1000, time.monotonic() - 4.0)]))
-    (inputs,) = [json.loads(data)["inputs"] for kind, data in ends[0].receive() if kind == DRIVE]
+    (inputs,) = [data[0] for kind, data in ends[0].receive() if kind == Kind.DRIVE]
     assert not inputs["on"]
     assert not any(inputs["axes"])
 
@@ -180,14 +179,14 @@ def test_giving_back_the_lease_is_never_too_much(hub, ends):
     now = time.monotonic()
     burst = [drive(n, now, HELD) for n in range(BURST)]
     serve(hub, QueuedSocket([*burst, ask_for("give")]))
-    assert ends[0].receive()[-1] == (LOST, b"")
+    assert ends[0].receive()[-1] == (Kind.LOST, None)
     run(hub.serve(QueuedSocket([drive(1, now)]), "another-page"))  # else it would be kept for the first
-    assert DRIVE in [kind for kind, _ in ends[0].receive()]
+    assert Kind.DRIVE in [kind for kind, _ in ends[0].receive()]
 
 
 def test_a_page_that_is_gone_is_lost_whatever_it_had_queued(hub, ends):
     serve(hub, QueuedSocket([drive(n, time.monotonic(), HELD) for n in range(BURST)]))
-    assert ends[0].receive()[-1] == (LOST, b"")
+    assert ends[0].receive()[-1] == (Kind.LOST, None)
 
 
 def test_a_page_that_is_cut_off_still_stops(hub, ends):
@@ -196,7 +195,7 @@ def test_a_page_that_is_cut_off_still_stops(hub, ends):
     )
     serve(hub, page)
     assert page.closed or not page.left
-    assert [kind for kind, _ in ends[0].receive() if kind == STOP] == [STOP, STOP]
+    assert [kind for kind, _ in ends[0].receive() if kind == Kind.STOP] == [Kind.STOP, Kind.STOP]
 
 
 def test_a_press_that_is_said_again_stops_once(hub, ends):
@@ -205,7 +204,7 @@ def test_a_press_that_is_said_again_stops_once(hub, ends):
         serve(hub, QueuedSocket([ask_for("stop", press=11)] * 5))
     serve(hub, QueuedSocket([ask_for("stop", press=12)]))
     serve(hub, QueuedSocket([ask_for("stop")]), QueuedSocket([ask_for("stop")]))
-    assert [kind for kind, _ in ends[0].receive()].count(STOP) == 4
+    assert [kind for kind, _ in ends[0].receive()].count(Kind.STOP) == 4
 
 
 def test_only_who_has_seen_the_stop_releases_it(hub, ends):
@@ -214,16 +213,16 @@ def test_only_who_has_seen_the_stop_releases_it(hub, ends):
     serve(hub, QueuedSocket([ask_for("stop", press=1)]))
     page = QueuedSocket([drive(1, before), ask_for("stop", False)])
     serve(hub, page)
-    assert not [data for kind, data in ends[0].receive() if kind == ASK]
+    assert not [data for kind, data in ends[0].receive() if kind == Kind.ASK]
     serve(hub, QueuedSocket([drive(1, time.monotonic()), ask_for("stop", False)]))
-    (release,) = [json.loads(data) for kind, data in ends[0].receive() if kind == ASK]
+    (release,) = [data for kind, data in ends[0].receive() if kind == Kind.ASK]
     assert release == {"what": "stop", "value": False}
 
 
 @pytest.mark.parametrize("press", [None, "x", 1.5, [], True, {}])
 def test_a_stop_is_a_stop_whatever_else_it_says(hub, ends, press):
     serve(hub, QueuedSocket([ask_for("stop", press=press, more=1)]))
-    assert (STOP, b"") in ends[0].receive()
+    assert (Kind.STOP, None) in ends[0].receive()
 
 
 @pytest.mark.parametrize("who", ["driver", "watcher"])

@@ -1,12 +1,10 @@
 """A law of a study's trials: a STOP holds until somebody releases it, in the next mode too."""
 
-import json
 from collections import Counter
-from types import SimpleNamespace
 
 from user_study_helpers import study_folder
 
-from handrail.collect.cockpit.pipe import STILL, STOP
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.user_study.driving import Driving
 from handrail.collect.user_study.plan import Step
 from handrail.controllers.interrupts import Interrupts
@@ -16,13 +14,13 @@ class StoppingServer:
     """Passes on a STOP, and then that the trial has failed."""
 
     def __init__(self):
-        self.pipe, self.unread = SimpleNamespace(dropped=Counter()), [(STOP, b"")]
+        self.pipe, self.dropped, self.unread = self, Counter(), [(Kind.STOP, None)]
 
     def receive(self):
         messages, self.unread = self.unread, []
-        return messages or [(STILL, json.dumps({"what": "failure", "value": True}).encode())]
+        return messages or [(Kind.STILL, {"what": "failure", "value": True})]
 
-    def send(self, *message):
+    def send(self, *message, **more):
         pass
 
     send_surely = keep = drop = send
@@ -35,4 +33,4 @@ def test_a_stop_holds_in_the_next_mode(tmp_path):
         driving.run(Step("practice", "ee", "reach"), 3)
         assert not server.unread
         driving.prepare("direct", "reach")
-        assert server.unread == [(STOP, b"")]
+        assert server.unread == [(Kind.STOP, None)]
