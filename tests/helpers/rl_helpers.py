@@ -17,7 +17,7 @@ def random_actor(seed: int = 0) -> Actor:
 
 
 TINY_RL = TrainRlConfig(
-    **{"steps": 60, "random_steps": 20, "layers": (8, 8), "batch_size": 8, "buffer_size": 200},
+    **{"steps": 60, "random_steps": 20, "layers": (8, 8), "batch_size": 8},
     **{"save_every": 40, "goals": 1, "final_goals": 2},
 )
 """Settings of a training of a moment."""

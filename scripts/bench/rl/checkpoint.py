@@ -39,23 +39,15 @@ _UNTIL = {"steps", "updates", "seconds"}  # what the last row of the curve has, 
 _ROW = {*_UNTIL, *SHOWN}  # and every other one
 _STEPS = re.compile(r"\d{8}", re.ASCII)  # name of a checkpoint
 _ENTROPY = "log_ent_coef"
-_WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
-_OURS = {*_WRITTEN, *(f".{name}.partial" for name in _WRITTEN), "checkpoints", "actors", "tensorboard"}
 
 
 def begin_run(config: TrainRlConfig) -> None:
     """Make the folder of a new run and write its settings."""
-    folder, settings = config.folder, config.folder / "config.json"
+    folder = config.folder
     if folder.exists() and any(folder.iterdir()):
-        if not config.overwrite:
-            raise HandrailError(f"{folder}: there is something already; expected --resume or --overwrite")
-        foreign = sorted(path.name for path in folder.iterdir() if path.name not in _OURS)
-        if foreign or not settings.is_file():
-            found = ", ".join(foreign[:3]) or "something else"
-            raise HandrailError(f"--overwrite: expected only a training run in {folder}, found {found}")
-        shutil.rmtree(folder)
+        raise HandrailError(f"{folder}: there is something already; expected another folder, or --resume")
     folder.mkdir(parents=True, exist_ok=True)
-    write_json(settings, asdict(config))
+    write_json(folder / "config.json", asdict(config))
 
 
 def check_resumes(config: TrainRlConfig) -> Path:

@@ -12,11 +12,9 @@ from handrail.datasets.lists import Numbers
 from handrail.policies.imitation.config import check_installed
 
 _FREE_ON_RESUME = (
-    *("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average"),
-    *("threads", "resume", "overwrite"),
+    *("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average", "resume"),
 )
 _Share = Annotated[float, Meta(gt=0, le=1)]
-_Factor = Annotated[float, Meta(gt=0, le=1e12)]
 
 
 @dataclass(frozen=True)
@@ -33,34 +31,22 @@ class TrainRlConfig:
     """Of the goals, the networks and the exploration."""
     learning_rate: _Share = 1e-4
     """Of actor, critics and entropy temperature; may be another one after a resume."""
-    gamma: _Share = 0.99
-    """Discount of the reward a step."""
     tau: _Share = 0.001
     """Share of the critics that enters their targets at every update."""
     batch_size: AtLeastOne = 256
     """Transitions an update."""
-    buffer_size: AtLeastOne = 100_000
-    """Transitions kept."""
     random_steps: Count = 10_000
     """Steps with random actions before the first update."""
     train_freq: AtLeastOne = 1
     """Environment steps between updates."""
-    gradient_steps: AtLeastOne = 1
-    """Updates each time."""
     layers: Numbers = (512, 512, 256)
     """Hidden layers of actor and critics."""
-    temperature: _Factor = 1.0
+    temperature: Annotated[float, Meta(gt=0, le=1e12)] = 1.0
     """Of the entropy in the beginning; then tuned automatically."""
-    action_change: NonNegative = 0.05
-    """Weight of the squared change of the action in the reward."""
-    action_size: NonNegative = 0.05
-    """Weight of the squared action in the reward."""
     failure_cost: NonNegative = 0.0
     """Subtracted from the reward when an episode is given up; without it, giving up early can pay."""
     physics: bool = True
     """Train in MuJoCo physics; without it an ideal robot that does what it is told."""
-    reward_scale: _Factor = 1.0
-    """Factor of the whole reward."""
     repeat_missed: Fraction = 0.0
     """Share of the episodes that try again a goal that was missed before."""
     save_every: AtLeastOne = 20_000
@@ -71,12 +57,8 @@ class TrainRlConfig:
     """Goals of the last evaluation, on which nothing is chosen."""
     average: AtLeastOne = 1
     """The actor at the end is the mean of so many last evaluated ones: steadier than any of them."""
-    threads: AtLeastOne = 1
-    """Of PyTorch."""
     resume: bool = False
     """Go on from the last checkpoint in the folder."""
-    overwrite: bool = False
-    """Remove the run that is there."""
 
     @property
     def folder(self) -> Path:
@@ -89,8 +71,6 @@ class TrainRlConfig:
         check_settings(self, "--")
         if not self.layers or min(self.layers) < 1:
             raise HandrailError(f"--layers {self.layers}: expected sizes of 1 or more")
-        if self.resume and self.overwrite:
-            raise HandrailError("--resume and --overwrite: expected one of them, got both")
 
     def check_continues(self, earlier: "TrainRlConfig") -> None:
         """Check that a run can go on with these settings."""

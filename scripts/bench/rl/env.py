@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,25 +43,17 @@ Score = dict[str, float]
 orientation_error, length [steps], arm_effort, base_path [m], jerkiness, contacts [steps]."""
 
 _BOUND = 20.0  # of any number in an observation
+_OF_ACTIONS = 0.05  # weights of the action and of its change in the reward
 _MISSED = 200  # goals kept to be tried again
 _FAILURES = 20  # steps off the planner's pose, by more than a success allows, that end an episode
 
 
-@dataclass(frozen=True)
-class Reward:
-    """`s(−½[(d/0.1)² + (r/0.05)²] − w_Δ‖a − a⁻‖² − w_a‖a‖²)`, d and r against the planner's pose."""
-
-    scale: float = 1.0  # s
-    change: float = 0.05  # w_Δ
-    size: float = 0.05  # w_a
-    failure: float = 0.0  # s times this is subtracted when an episode is given up
-
-    def value(self, d: float, r: float, action: FloatArray, previous: FloatArray) -> float:
-        """Return the reward of a step that ended d [m] and r off the planner's pose."""
-        tracking = (d / POSITION_TOLERANCE) ** 2 + (r / ORIENTATION_TOLERANCE) ** 2
-        change = action - previous
-        regularisation = self.change * (change @ change) + self.size * (action @ action)
-        return -self.scale * float(0.5 * tracking + regularisation)
+def reward_of(d: float, r: float, action: FloatArray, previous: FloatArray) -> float:
+    """Return `−½[(d/0.1)² + (r/0.05)²] − 0.05 ‖a − a⁻‖² − 0.05 ‖a‖²`, d [m] and r off the planner's pose."""
+    tracking = (d / POSITION_TOLERANCE) ** 2 + (r / ORIENTATION_TOLERANCE) ** 2
+    change = action - previous
+    regularisation = _OF_ACTIONS * (change @ change) + _OF_ACTIONS * (action @ action)
+    return -float(0.5 * tracking + regularisation)
 
 
 class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
@@ -76,7 +67,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
     Args:
         robot: name or description file; its base must be planar and its arm must have six joints.
         early_failure: whether to give up an episode that has left the planner's pose.
-        reward: of every step.
+        failure_cost: subtracted from the reward when an episode is given up.
         physics: MuJoCo, or an ideal robot whose overlapping shapes count as contacts.
         repeat_missed: share of the episodes that try again a goal that was missed before.
     """
@@ -85,7 +76,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self,
         robot: str | Path = "ridgeback_ur10",
         early_failure: bool = True,
-        reward: Reward | None = None,
+        failure_cost: float = 0.0,
         physics: bool = True,
         repeat_missed: float = 0.0,
     ) -> None:
@@ -94,8 +85,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self.observation_space = spaces.Box(-_BOUND, _BOUND, (OBSERVATION_SIZE,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
         self.arm = ArmCompletion(self.model)
-        self._reward = reward or Reward()
-        self._early_failure, self._physics = early_failure, physics
+        self._early_failure, self._failure_cost, self._physics = early_failure, failure_cost, physics
         self._repeat_missed = repeat_missed
         self._missed: deque[Pose] = deque(maxlen=_MISSED)
 
@@ -124,11 +114,11 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._measure()
         self.time += 1
         d, r = pose_error(*self._pose, Pose(*self.planner.pose(self.time)))
-        reward = self._reward.value(d, r, action, self._previous)
+        reward = reward_of(d, r, action, self._previous)
         self._previous = action
         self._failures += not reached(d, r)
         failed = self._early_failure and (touches or self._failures >= _FAILURES)
-        reward -= self._reward.scale * self._reward.failure * failed
+        reward -= self._failure_cost * failed
         d_p, d_r = pose_error(*self._pose, self.planner.goal)
         success = reached(d_p, d_r) and not failed
         timed_out = self.time >= T_MAX

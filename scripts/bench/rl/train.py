@@ -39,7 +39,6 @@ from handrail.scripts.bench.rl.config import TrainRlConfig
 from handrail.scripts.bench.rl.env import (
     FINAL_SEED,
     GoalReachingEnv,
-    Reward,
     evaluate,
     evaluation_goals,
     means,
@@ -47,7 +46,8 @@ from handrail.scripts.bench.rl.env import (
 )
 
 _TARGET_ENTROPY = -3.0
-_PLACES = ("output_dir", "resume", "overwrite")  # of a run, not of what came out
+_BUFFER = 100_000  # transitions that are kept
+_PLACES = ("output_dir", "resume")  # of a run, not of what came out
 
 
 def train(config: TrainRlConfig) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
         KeyboardInterrupt: it was interrupted; a checkpoint is written, and it can be resumed.
     """
     config.check()
-    torch.set_num_threads(config.threads)
+    torch.set_num_threads(1)
     curve: Curve = []
     seconds, last = 0.0, check_resumes(config) if config.resume else None
     if last is None:
@@ -169,22 +169,21 @@ class Watch(BaseCallback):
 
 def new_model(config: TrainRlConfig) -> SAC:
     """Return an actor and critics that have learned nothing."""
-    reward = Reward(config.reward_scale, config.action_change, config.action_size, config.failure_cost)
     matrix = conditioning()
     space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
-    env = GoalReachingEnv(reward=reward, physics=config.physics, repeat_missed=config.repeat_missed)
+    env = GoalReachingEnv(
+        failure_cost=config.failure_cost, physics=config.physics, repeat_missed=config.repeat_missed
+    )
     env = TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)
     return SAC(
         "MlpPolicy",
         env,
         learning_rate=config.learning_rate,
-        buffer_size=config.buffer_size,
+        buffer_size=_BUFFER,
         learning_starts=config.random_steps,
         batch_size=config.batch_size,
         tau=config.tau,
-        gamma=config.gamma,
         train_freq=config.train_freq,
-        gradient_steps=config.gradient_steps,
         ent_coef=f"auto_{config.temperature}",
         target_entropy=_TARGET_ENTROPY,
         policy_kwargs={"net_arch": list(config.layers), "optimizer_kwargs": {"fused": True}},
@@ -204,7 +203,7 @@ def _record(config: TrainRlConfig, curve: Curve, final: dict[str, dict[str, floa
         "settings": settings,
         "seconds": curve[-1]["seconds"],
         "updates": curve[-1]["updates"],
-        "hardware": {"processor": _processor(), "cores": os.cpu_count(), "threads": config.threads},
+        "hardware": {"processor": _processor(), "cores": os.cpu_count(), "threads": torch.get_num_threads()},
         "versions": {
             "python": platform.python_version(),
             **versions(*SIMULATION, "stable-baselines3", "torch"),

@@ -16,7 +16,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.observation import TrackingSituation, base_velocity, observe
-from handrail.scripts.bench.rl.env import GoalReachingEnv, Reward
+from handrail.scripts.bench.rl.env import GoalReachingEnv, reward_of
 
 SEEDS = st.integers(0, 2**32 - 1)
 NEAR = Pose(np.array([-0.6, 0.3, 0.9]), np.eye(3))
@@ -131,8 +131,7 @@ def test_physics_are_the_ideal_robot_s_but_for_the_servos():
 def test_reward_is_the_paper_s():
     action, previous = np.array([0.5, 0.0, -1.0]), np.array([0.0, 1.0, -1.0])
     expected = -0.5 * (0.2**2 / 0.1**2 + 0.1**2 / 0.05**2) - 0.05 * 1.25 - 0.05 * 1.25
-    assert Reward().value(0.2, 0.1, action, previous) == pytest.approx(expected)
-    assert Reward(scale=0.1).value(0.2, 0.1, action, previous) == pytest.approx(0.1 * expected)
+    assert reward_of(0.2, 0.1, action, previous) == pytest.approx(expected)
 
 
 def run(env, action):
@@ -166,7 +165,7 @@ def touch(env: GoalReachingEnv) -> tuple[int, float, bool, bool]:
 @pytest.mark.parametrize("physics", [True, False])
 def test_an_episode_in_which_the_robot_touches_itself_is_given_up_at_its_cost(physics):
     """Law: the contact ends the episode at once, and costs what giving up costs."""
-    ends = touch(GoalReachingEnv(physics=physics, reward=Reward(failure=50.0)))
+    ends = touch(GoalReachingEnv(physics=physics, failure_cost=50.0))
     goes_on = touch(GoalReachingEnv(physics=physics, early_failure=False))
     assert ends[0] == goes_on[0]
     assert ends[2:] == (True, True)
