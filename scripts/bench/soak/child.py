@@ -114,8 +114,8 @@ class Child:
         self._process.wait()
         return None
 
-    def complaints(self, code: int | None, codes: Collection[int]) -> tuple[list[str], int]:
-        """Return what is wrong with its end, and how many processes it left behind; they are killed then."""
+    def complaints(self, code: int | None, codes: Collection[int]) -> list[str]:
+        """Return what is wrong with its end; processes that it left behind are killed then."""
         wait_until(lambda: not session(self.pid), _REAPED)
         send(signal.SIGKILL, *(left := session(self.pid)))
         found = []
@@ -127,7 +127,7 @@ class Child:
             found.append(f"a traceback: {self.last_line}")
         if left:
             found.append(f"{len(left)} processes were left behind")
-        return found, len(left)
+        return found
 
 
 def session(leader: int) -> list[int]:

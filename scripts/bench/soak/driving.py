@@ -197,7 +197,7 @@ class DrivenHours:
         lost = [each for each in before if now.get(each) != before[each]]
         complaints += [f"{each} was saved and is gone or another" for each in lost]
         row |= {"round": self._number, "fault": fault, "work": "drive in the browser, one process"}
-        row |= {"saved_before": _episodes(before), "saved_after": _episodes(now), "lost": _episodes(lost)}
+        row |= {"saved_before": _episodes(before), "lost": _episodes(lost)}
         note(self._out / DRIVING, row | {"complaints": complaints})
 
     def _look_at_memory(self, page: WanderingPage) -> None:
@@ -216,7 +216,7 @@ class DrivenHours:
         if ran:
             send(signal.SIGINT, self._child.pid)
         code = self._child.end(_PATIENCE)
-        complaints, _ = self._child.complaints(code, {130})
+        complaints = self._child.complaints(code, {130})
         repair = Child(words_of("edit repair {}", self._root), self._out, f"{self._root.name}-repair")
         if repair.end(_PATIENCE * 5) != 0 or "nothing to repair" not in repair.output:
             complaints.append(repair.last_line)

@@ -100,12 +100,9 @@ def _ballast(folder: Path) -> Path:
 
 def _fill(child: Child, folder: Path, rng: np.random.Generator) -> None:
     """Fill the disk but for a few bytes."""
-    left = int(rng.integers(0, 60_000))
-    with open(_ballast(folder), "wb", buffering=0) as file, suppress(OSError):
-        while True:
-            file.write(bytes(4096))
+    ballast, left = _ballast(folder), int(rng.integers(0, 60_000))
     with suppress(OSError):
-        os.truncate(_ballast(folder), max(0, _ballast(folder).stat().st_size - left))
+        ballast.write_bytes(bytes(max(0, shutil.disk_usage(folder).free - left)))
 
 
 def _lock_folders(folder: Path, sign: str = "+") -> None:
@@ -118,7 +115,7 @@ FAULTS = (
     Fault("SIGKILL of the command and all its workers", _to_all(signal.SIGKILL), KILLED),
     Fault("SIGKILL while the disk is slow", _kill_slowly, KILLED),
     Fault("SIGKILL of one worker", _kill_worker, _FINE, needs="workers"),
-    Fault("a lost Ray node", lambda child, folder, rng: lose_node(folder), _FINE, needs="cluster"),
+    Fault("a lost Ray node", lambda child, folder, rng: lose_node(), _FINE, needs="cluster"),
     Fault("SIGTERM", _to_command(signal.SIGTERM), {130}),
     Fault("the terminal is closed (SIGHUP)", _to_all(signal.SIGHUP), {-signal.SIGHUP}),
     Fault("Ctrl-C", _to_all(signal.SIGINT), {130}),

@@ -63,14 +63,14 @@ class _Round:
         work, fault, mended = self._work, self._fault, ""
         child = self._begin(work.words())
         struck = self._await_moment(child)
-        when, before = time.monotonic() - child.begun, work.saved()
+        before = work.saved()
         try:
             if struck:
                 fault.strike(child, work.folder, self._rng)
             work.code = code = child.end(_PATIENCE)
         finally:
             fault.heal(work.folder)
-        orphans = self._judge(child, code, fault.codes if struck else {0})
+        self._judge(child, code, fault.codes if struck else {0})
         after = self._look(before, "after the fault")
         if work.root and self._rng.random() < 0.5:
             repairing = self._begin(words_of("edit repair {}", work.root))
@@ -86,16 +86,13 @@ class _Round:
             self._complaints.append(f"left behind: {', '.join(left)}")
         return {
             "struck": struck,
-            "at": round(when, 1),
             "saved_before": len(before),
-            "saved_after": len(after),
             "lost": sum(final.get(each) != work.wanted.get(each) for each in before),
             "code": code,
             "said": child.last_line,
             "mended": mended,
             "goes": goes,
             "last_code": last,
-            "orphans": orphans,
             "complaints": self._complaints,
         }
 
@@ -115,11 +112,9 @@ class _Round:
             time.sleep(self._rng.uniform(0.0, _EPISODE))
         return child.runs
 
-    def _judge(self, child: Child, code: int | None, codes: set[int]) -> int:
-        """Note an end that may not be; return how many processes were left behind."""
-        complaints, orphans = child.complaints(code, codes)
-        self._complaints += complaints
-        return orphans
+    def _judge(self, child: Child, code: int | None, codes: set[int]) -> None:
+        """Note an end that may not be."""
+        self._complaints += child.complaints(code, codes)
 
     def _look(self, before: Saved, when: str) -> Saved:
         try:

@@ -3,7 +3,7 @@
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +54,7 @@ class Workshop:
 
     def recorded(self, recipe: str, episodes: int = _EPISODES) -> Path:
         """Return a dataset as it is recorded when nothing disturbs."""
-        words = f"record {{0}}/d {_RECIPES[recipe]} --dataset.num_episodes {episodes}"
+        words = f"{_record(recipe)} --dataset.num_episodes {episodes}"
         return self.made(f"{recipe}-{episodes}", words, {}, "d")
 
     def packed(self, recipe: str, episodes: int) -> Path:
@@ -199,23 +199,21 @@ def any_work(
     """
     recipe = str(rng.choice(list(_RECIPES)))
     ray = fault.needs == "cluster" or (not only and rng.random() < _RAY and fault.codes >= KILLED)
-    with cluster(folder) if ray else nullcontext() as address:
-        yield _work(folder, workshop, rng, fault.needs == "workers", only, recipe, address)
+    if not ray:
+        yield _work(folder, workshop, rng, fault.needs == "workers", only, recipe)
+        return
+    with cluster() as address:
+        wanted, words = saved_in(workshop.recorded(recipe)), f"{_record(recipe)} --ray {address}"
+        yield RecordingWork("record --ray", folder / "d", words, wanted, read=saved_by)
+
+
+def _record(recipe: str) -> str:
+    return f"record {{0}}/d {_RECIPES[recipe]}"
 
 
 def _work(
-    folder: Path,
-    workshop: Workshop,
-    rng: np.random.Generator,
-    workers: bool,
-    only: str,
-    recipe: str,
-    address: str | None,
+    folder: Path, workshop: Workshop, rng: np.random.Generator, workers: bool, only: str, recipe: str
 ) -> Work:
-    record = f"record {{0}}/d {_RECIPES[recipe]}"
-    if address:
-        wanted, words = saved_in(workshop.recorded(recipe)), f"{record} --ray {address}"
-        return RecordingWork("record --ray", folder / "d", words, wanted, read=saved_by)
     kinds = {only: 1} if only else {"record_2": 5, "evaluate": 1} if workers else _KINDS
     share = np.array(list(kinds.values()), float)
     kind = str(rng.choice(list(kinds), p=share / share.sum()))
@@ -233,7 +231,7 @@ def _work(
         shutil.copytree(source, folder / "d")
         name += " --resume" + (", packed before" if kind == "packed" else "")
     return RecordingWork(
-        name, folder / "d", record + shared, saved_in(workshop.recorded(recipe)), read=saved_by
+        name, folder / "d", _record(recipe) + shared, saved_in(workshop.recorded(recipe)), read=saved_by
     )
 
 
