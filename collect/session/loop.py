@@ -209,4 +209,5 @@ class EpisodeLoop:
         return bool(self.env.plant.held())
 
     def _view(self, observation: Observation) -> View:
-        return View(self.env.plant.state(), self.env.task_state(), observation)
+        env = self.env
+        return View(*((env.state(), env.task_state()) if env.real else env.seen), observation)

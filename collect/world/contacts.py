@@ -35,6 +35,7 @@ class Contacts:
         forbidden[_GRASP, _MOVABLE] = forbidden[_MOVABLE, _GRASP] = False
         self._forbidden = forbidden[np.ix_(kinds, kinds)]
         self._pairs: set[tuple[int, int]] = set()
+        self._seen: dict[bytes, list[tuple[int, int]]] = {}  # forbidden ones, by all that touch
         self._fingers = [model.geom(name).id for name in FINGERS] if grips else []
         self._portable = {bodies[item.name]: item.name for item in scene.movables if item.portable}
 
@@ -44,10 +45,13 @@ class Contacts:
 
     def look(self, data: MjData) -> None:
         """Remember the forbidden contacts of this instant, of which there are some contacts."""
-        first, second = data.contact.geom.T
-        hit = self._forbidden[first, second]
-        if hit.any():
-            self._pairs.update(zip(first[hit].tolist(), second[hit].tolist(), strict=True))
+        touching = data.contact.geom
+        place = touching.tobytes()  # mostly as at the instant before
+        if place not in self._seen:
+            first, second = touching.T
+            hit = self._forbidden[first, second]
+            self._seen[place] = list(zip(first[hit].tolist(), second[hit].tolist(), strict=True))
+        self._pairs.update(self._seen[place])
 
     @property
     def names(self) -> tuple[str, ...]:

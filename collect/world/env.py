@@ -50,6 +50,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         task, fps, cameras, image_size, render_size, real: as they were said.
         model: kinematics of the robot.
         period: from one step to the next [s].
+        seen: the robot and the truth after the last step.
         agent_names: names of the numbers in `agent_pos`.
         state_names: names of the numbers in `environment_state`.
     """
@@ -187,6 +188,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Return observation and info of a moment: the one place where they are assembled."""
         verdict, contacts = verdict or Verdict(), self.plant.contacts
+        self.seen = self.state(), state
         info = {
             "is_success": verdict.success,
             "failure_reason": verdict.failure,
@@ -198,7 +200,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if not self._observes:
             return {"agent_pos": _NOTHING, "environment_state": _NOTHING}, info
         observation: Observation = {
-            "agent_pos": self._agent.read(self.state(), state.tool, state.opening),
+            "agent_pos": self._agent.read(self.seen[0], state.tool, state.opening),
             "environment_state": bounded(self.task.features(state)),
         }
         if self.cameras:

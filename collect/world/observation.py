@@ -77,7 +77,7 @@ class AgentObservation:
 
 def bounded(numbers: FloatArray) -> NDArray[np.float32]:
     """Return the numbers as float32 within the space's bounds."""
-    within = np.clip(numbers, -_BOUND, _BOUND)
+    within = np.minimum(np.maximum(numbers, -_BOUND), _BOUND)
     return np.where(np.isnan(within), 0.0, within).astype(np.float32)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -143,17 +144,26 @@ class SceneObject(FrozenArrays):
             tool: pose of the tool point.
             now: its own pose.
         """
-        size, centre = geometry.box_around((part.shape, part.position, part.rotation) for part in self.solids)
+        shape, centre = self._box
         inverse = tool.rotation.T
         position = inverse @ (now.position + now.rotation @ centre - tool.position)
-        return Obstacle(self.name, box(size), position, inverse @ now.rotation, frame="tool")
+        return Obstacle(self.name, shape, position, inverse @ now.rotation, frame="tool")
 
     def obstacle(self, time: float = 0.0) -> Obstacle:
         """Return it as the controller sees it at a time of the episode [s]."""
-        still = Obstacle(self.name, self.shape, self.position, self.rotation, work_surface=self.work_surface)
         if self.patrol is None:
-            return still
-        return replace(still, position=self.patrol.position(time), velocity=self.patrol.velocity(time))
+            return self._still
+        return replace(self._still, position=self.patrol.position(time), velocity=self.patrol.velocity(time))
+
+    @cached_property
+    def _still(self) -> Obstacle:
+        return Obstacle(self.name, self.shape, self.position, self.rotation, work_surface=self.work_surface)
+
+    @cached_property
+    def _box(self) -> tuple[Shape, FloatArray]:
+        """The box around it, and its centre, in its own frame."""
+        size, centre = geometry.box_around((part.shape, part.position, part.rotation) for part in self.solids)
+        return box(size), centre
 
 
 @dataclass(frozen=True)

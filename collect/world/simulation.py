@@ -22,7 +22,7 @@ from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _TIMESTEP = 0.002  # [s]
-_UNSTABLE = ("mjWARN_BADQACC", "mjWARN_BADQVEL", "mjWARN_BADQPOS")
+_UNSTABLE = [int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{number}")) for number in ("QACC", "QVEL", "QPOS")]
 
 
 class Simulation(Plant):
@@ -72,6 +72,7 @@ class Simulation(Plant):
             where = f"robot {model.description.name} in its scene"
             raise HandrailError(f"{where}: MuJoCo says: {message_of(error)}") from error
         self.data = mujoco.MjData(self.mujoco_model)
+        self._held_at = -math.inf  # what was held then is known
         self._contacts = Contacts(self.mujoco_model, scene, grasp_geoms(model), self._gripper is not None)
         self._index()
         self._place(q, grip)
@@ -93,6 +94,8 @@ class Simulation(Plant):
         self._reach = reach  # of the fingers in a step
         movers = [(int(compiled.body(item.name).mocapid[0]), item.patrol) for item in self._scene.movers]
         self._patrols = [(body, patrol) for body, patrol in movers if patrol]
+        self._bodies = {item.name: int(compiled.body(item.name).id) for item in self._scene.objects}
+        self._speeds = {item.name: self.data.joint(item.name).qvel for item in self._scene.movables}
 
     def _place(self, q: FloatArray, grip: float | None) -> None:
         """Put the robot at q, the gripper open, or closed around something of width `grip` [m]."""
@@ -150,6 +153,7 @@ class Simulation(Plant):
         mujoco.mj_copyData(self.data, self.mujoco_model, data)
         self._gate.restore(sent)
         self._contacts.clear()
+        self._held_at = -math.inf
 
     @property
     def contacts(self) -> tuple[str, ...]:
@@ -204,8 +208,7 @@ class Simulation(Plant):
     @property
     def is_stable(self) -> bool:
         """Whether MuJoCo never had to give up on a step."""
-        kinds = (int(getattr(mujoco.mjtWarning, name)) for name in _UNSTABLE)
-        return all(self.data.warning[kind].number == 0 for kind in kinds)
+        return not self.data.warning.number[_UNSTABLE].any()
 
     def poses(self) -> dict[str, Pose]:
         """Return where every scene object is now, by name."""
@@ -213,18 +216,21 @@ class Simulation(Plant):
 
     def still(self) -> frozenset[str]:
         """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
-        velocities = {item.name: self.data.joint(item.name).qvel for item in self._scene.movables}
         norm = np.linalg.norm  # of v; of ω, of which what slides has none
-        return frozenset(name for name, v in velocities.items() if norm(v[:3]) < 0.02 and norm(v[3:]) < 0.2)
+        speeds = self._speeds.items()
+        return frozenset(name for name, v in speeds if norm(v[:3]) < 0.02 and norm(v[3:]) < 0.2)
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""
-        tool, names = self.tool, self._contacts.held(self.data)
-        return tuple(self._scene.find(name).carried(tool, self._pose(name)) for name in names)
+        if self._held_at != self.data.time:
+            tool, names = self.tool, self._contacts.held(self.data)
+            self._held = tuple(self._scene.find(name).carried(tool, self._pose(name)) for name in names)
+            self._held_at = self.data.time
+        return self._held
 
     def _pose(self, name: str) -> Pose:
-        body = self.data.body(name)
-        return _pose(body.xpos, body.xmat)
+        body = self._bodies[name]
+        return _pose(self.data.xpos[body], self.data.xmat[body])
 
 
 def _pose(position: FloatArray, rotation: FloatArray) -> Pose:

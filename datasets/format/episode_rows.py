@@ -24,7 +24,14 @@ from handrail.datasets.format.layout import Layout, chunk_and_file, file_index_o
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import Checksum, ColumnTypes, EpisodeRecord, Totals, is_extra
 from handrail.datasets.format.schema import video_keys
-from handrail.datasets.format.stats import STATISTICS, Stats, stats_from_lists, stats_to_lists
+from handrail.datasets.format.stats import (
+    MEASURED,
+    STATISTICS,
+    Statistics,
+    Stats,
+    stats_from_lists,
+    stats_to_lists,
+)
 from handrail.datasets.format.tables import flat_numbers, lists, numbers, parquet_bytes, plain_values, scalars
 from handrail.datasets.storage.strict_json import parse_json
 
@@ -222,18 +229,26 @@ def rows_bytes(
         columns[name] = scalars([record.columns.get(name) for record in records], kind)
     stats = [record.stats or {} for record in records]
     for key in stats[0]:
-        for name in STATISTICS:  # (E, d), or (E, 3, 1, 1) of a camera, nested as the arrays are
-            values = np.stack([each[key][name] for each in stats])
-            nested = numbers(values.reshape(-1), pa.int64() if name == "count" else pa.float64())
-            for size in reversed(values.shape[1:]):
-                nested = lists(nested, np.full(len(nested) // size, size))
-            columns[f"{STATS}{key}/{name}"] = nested
+        found = _statistics([each[key] for each in stats])
+        columns |= {f"{STATS}{key}/{name}": found[name] for name in STATISTICS}
     columns |= _place("meta/episodes", records)
     marks: dict[bytes, str | bytes] = {_FILES: _files_json(records[0].files)}
     if totals is not None:
         said = {"episodes": totals.episodes, "frames": totals.frames, "tasks": totals.tasks}
         marks[_TOTALS] = json.dumps(said | {"stats": stats_to_lists(totals.stats or {})})
     return _bytes(pa.Table.from_arrays(list(columns.values()), names=list(columns)), marks)
+
+
+def _statistics(stats: Sequence[Statistics]) -> dict[str, pa.Array]:
+    """Return a column's statistics, (E, d), or (E, 3, 1, 1) of a camera, nested as the arrays are."""
+    found: dict[str, pa.Array] = {}
+    for names, kind in ((MEASURED, pa.float64()), (("count",), pa.int64())):
+        values = np.array([each[name] for name in names for each in stats])
+        nested = numbers(values.reshape(-1), kind)
+        for size in reversed(values.shape[1:]):
+            nested = lists(nested, np.full(len(nested) // size, size))
+        found |= {name: nested.slice(place * len(stats), len(stats)) for place, name in enumerate(names)}
+    return found
 
 
 def with_checksums(path: Path, files: Mapping[str, Checksum]) -> bytes:

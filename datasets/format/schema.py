@@ -4,9 +4,11 @@ Keys that begin `observation` or `action` become inputs and outputs of a LeRobot
 anything else (`teleop.*`, `controller.*`, …) is kept beside them.
 """
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import msgspec
@@ -57,6 +59,11 @@ class Feature:
         """The feature as LeRobot writes it into JSON."""
         names = None if self.names is None else list(self.names)
         return {"dtype": self.dtype, "shape": list(self.shape), "names": names}
+
+    @cached_property
+    def number(self) -> np.dtype[Any]:
+        """The type of its numbers; a video's are bytes."""
+        return np.dtype("uint8" if self.is_video else self.dtype)
 
     @property
     def is_video(self) -> bool:
@@ -154,18 +161,17 @@ def _check_value(key: str, feature: Feature, value: Any) -> Any:
         if not isinstance(value, str):
             raise HandrailError(f"frame: {key!r} expected a str, got {type(value).__name__}")
         return str(value)
-    given = np.asarray(value)
-    dtype = np.dtype("uint8" if feature.is_video else feature.dtype)
-    shape = (1,) if given.shape == () and feature.is_scalar else given.shape
-    if shape != feature.shape:
+    given, dtype = np.asarray(value), feature.number
+    if given.shape != feature.shape and not (given.shape == () and feature.is_scalar):
         raise HandrailError(f"frame: {key!r} expected the shape {feature.shape}, got {given.shape}")
-    if not np.can_cast(given.dtype, dtype, "equiv" if feature.is_video else "same_kind"):
+    as_it_is = given.dtype == dtype
+    if not (as_it_is or np.can_cast(given.dtype, dtype, "equiv" if feature.is_video else "same_kind")):
         raise HandrailError(f"frame: {key!r} expected {dtype}, got {given.dtype}")
     if feature.is_video:
         return given
-    with np.errstate(over="ignore"):
-        array = given.reshape(shape).astype(dtype)
-    if dtype.kind in "iu" and not np.array_equal(array.ravel(), given.ravel()):
+    with contextlib.nullcontext() if as_it_is else np.errstate(over="ignore"):
+        array = given.astype(dtype).reshape(feature.shape)
+    if dtype.kind in "iu" and not (as_it_is or np.array_equal(array.ravel(), given.ravel())):
         raise HandrailError(f"frame: {key!r} expected values that fit {dtype}, got {given.tolist()}")
     if key.startswith(POLICY_PREFIXES) and dtype.kind == "f" and not np.isfinite(array).all():
         where = int(np.flatnonzero(~np.isfinite(array))[0])

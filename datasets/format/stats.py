@@ -19,7 +19,7 @@ QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 _SHARES = np.array(list(QUANTILES.values()))
 BINS = 5000
 STATISTICS = ("min", "max", "mean", "std", "count", *QUANTILES)
-_OTHERS = tuple(name for name in STATISTICS if name != "count")
+MEASURED = tuple(name for name in STATISTICS if name != "count")
 _LARGE = 1e150  # what may be squared
 _LEVELS = np.arange(256, dtype=np.float64)
 
@@ -205,18 +205,18 @@ def _joined(stats: Stats, keys: Sequence[str]) -> Statistics:
     """Return the statistics of many columns, one after the other: one operation is quicker than many."""
     sizes = [stats[key]["mean"].size for key in keys]
     counts = [stats[key]["count"][0] for key in keys]
-    found = {name: np.concatenate([stats[key][name].ravel() for key in keys]) for name in _OTHERS}
+    found = {name: np.concatenate([stats[key][name].ravel() for key in keys]) for name in MEASURED}
     return found | {"count": np.repeat(counts, sizes)}
 
 
 def _split(joined: Mapping[str, np.ndarray], like: Stats, keys: Sequence[str]) -> Stats:
     """Return each column's own part again, in the shape that it has elsewhere."""
-    ends = np.cumsum([like[key]["mean"].size for key in keys])[:-1]
-    parts = {name: np.split(values, ends) for name, values in joined.items()}
-    found: Stats = {}
-    for place, key in enumerate(keys):
-        found[key] = {name: parts[name][place].reshape(like[key]["mean"].shape) for name in _OTHERS}
-        found[key]["count"] = parts["count"][place][:1]
+    found, begin = Stats(), 0
+    for key in keys:
+        mean = like[key]["mean"]
+        part = slice(begin, begin := begin + mean.size)
+        found[key] = {name: joined[name][part].reshape(mean.shape) for name in MEASURED}
+        found[key]["count"] = joined["count"][part][:1]
     return found
 
 

@@ -1,5 +1,6 @@
 """What Handrail records of every moment: the columns of a frame."""
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -62,13 +63,13 @@ COLUMNS = (
     Column("teleop.axes", "int64", lambda frame: frame.intent.raw.axes),
     Column("teleop.switches", "int64", lambda frame: frame.intent.raw.switches),
     Column("teleop.device", "string", lambda frame: frame.intent.raw.device),
-    Column("teleop.age", "float32", lambda frame: _finite(frame.intent.raw.age)),
-    Column("teleop.round_trip", "float32", lambda frame: _finite(frame.intent.raw.round_trip)),
+    Column("teleop.age", "float32", lambda frame: _finite_number(frame.intent.raw.age)),
+    Column("teleop.round_trip", "float32", lambda frame: _finite_number(frame.intent.raw.round_trip)),
     Column("teleop.undos", "int64", lambda frame: frame.undos),
     Column("controller.command", "float32", lambda frame: frame.command, "velocities"),
     Column("controller.solve_time", "float32", lambda frame: frame.diagnostics.solve_time),
     Column("controller.status", "string", lambda frame: frame.diagnostics.status.value),
-    Column("controller.slack", "float32", lambda frame: _finite(frame.diagnostics.slack)),
+    Column("controller.slack", "float32", lambda frame: _finite_number(frame.diagnostics.slack)),
     Column(
         "controller.smallest_distance", "float32", lambda f: finite_distance(f.diagnostics.smallest_distance)
     ),
@@ -135,12 +136,16 @@ def _raw(intent: Intent) -> FloatArray:
     return _finite(intent.raw.values if intent.raw.values.size else np.zeros(len(intent.values)))
 
 
-def _finite(numbers: FloatArray | float) -> FloatArray:
+def _finite(numbers: FloatArray) -> FloatArray:
     """Return numbers cut to ±`MOST`; what is none becomes 0."""
-    within = np.clip(numbers, -MOST, MOST)
+    within = np.minimum(np.maximum(numbers, -MOST), MOST)
     return np.where(np.isnan(within), 0.0, within)
+
+
+def _finite_number(number: float) -> float:
+    return 0.0 if math.isnan(number) else min(max(number, -MOST), MOST)
 
 
 def finite_distance(distance: float) -> float:
     """Return a distance cut to `FARTHEST`, which also stands for one that nobody knows [m]."""
-    return min(distance, FARTHEST) if np.isfinite(distance) else FARTHEST
+    return min(distance, FARTHEST) if math.isfinite(distance) else FARTHEST

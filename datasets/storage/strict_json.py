@@ -5,6 +5,8 @@ import math
 from pathlib import Path
 from typing import Any, NoReturn
 
+import msgspec
+
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import open_regular
 from handrail.datasets.storage.atomic import write_whole
@@ -55,7 +57,7 @@ def write_json(path: Path, content: Any, indent: int | None = 1) -> None:
 
 def json_bytes(content: Any) -> bytes:
     """Return JSON as LeRobot writes it, the same bytes for the same content."""
-    return json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False).encode()
+    return msgspec.json.format(json.dumps(content, ensure_ascii=False, allow_nan=False).encode(), indent=4)
 
 
 def parse_json(data: bytes) -> Any:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.scripted.steering import MotionGoal, hand_errors
+from handrail.collect.operators.scripted.steering import MotionGoal, hand_errors, length
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_vector
 from handrail.controllers.robot.model import Pose
@@ -56,21 +56,21 @@ class Perception:
 
     def see(self, goal: MotionGoal, tool: Pose, time: float) -> MotionGoal:
         """Return the goal as it comes out of what is seen at a time [s]."""
-        hand, base = np.split(self._share * self._wander.at(time), [6])
+        off = self._share * self._wander.at(time)
         if not self._share:
             return goal
-        target = goal.target
+        hand, base, target = off[:6], off[6:], goal.target
         if target is not None:
-            away, turn = np.split(_off(hand_errors(tool, target.hand), hand, 3), 2)
-            seen = Pose(tool.position + away, matrix_from_vector(turn) @ tool.rotation)
+            way = _off(hand_errors(tool, target.hand), hand, 3)
+            seen = Pose(tool.position + way[:3], matrix_from_vector(way[3:]) @ tool.rotation)
             target = replace(target, hand=seen, meant=target.hand)
         return replace(goal, hand=_off(goal.hand, hand, 3), base=_off(goal.base, base, 2), target=target)
 
 
 def _off(vector: FloatArray, share: FloatArray, lengths: int) -> FloatArray:
     """Return a way and a turn that are misjudged by shares of their norms; the way has so many numbers."""
-    parts = zip(np.split(vector, [lengths]), np.split(share, [lengths]), strict=True)
-    return np.concatenate([part + np.linalg.norm(part) * off for part, off in parts])
+    parts = ((vector[part], share[part]) for part in (slice(lengths), slice(lengths, None)))
+    return np.concatenate([part + length(part) * off for part, off in parts])
 
 
 class HumanHand:

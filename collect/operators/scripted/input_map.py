@@ -90,6 +90,7 @@ class InputMap(ABC):
 
     def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
         self.mode = mode
+        self._masks: dict[Focus, BoolArray] = {}
         self.channels = Channels.of(model.description)
         self._model, self._gains = model, gains
         self._base = len(self.channels.base)
@@ -133,7 +134,9 @@ class StickMap(InputMap):
 
     def mask(self, focus: Focus) -> BoolArray:
         """Return the channels that the operator owns, (m,)."""
-        return self.channels.mask(*self.mode.groups(focus))
+        if focus not in self._masks:
+            self._masks[focus] = self.channels.mask(*self.mode.groups(focus))
+        return self._masks[focus]
 
     def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask, and the goal on every channel of the mode, within full stick, (m,)."""

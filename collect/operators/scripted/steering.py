@@ -1,5 +1,6 @@
 """What an operator wants, whatever the teleop mode, and how far they push the stick towards it."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,9 +81,14 @@ class Gains:
         return np.array([*hand, self.base_speed, self.base_speed, self.base_rate])
 
 
+def length(vector: FloatArray) -> float:
+    """Return the norm of a vector, (n,)."""
+    return math.sqrt(vector.dot(vector))
+
+
 def saturated(vector: FloatArray, largest: float) -> FloatArray:
     """Return the vector, shortened to the largest norm."""
-    norm = float(np.linalg.norm(vector))
+    norm = length(vector)
     return vector * (largest / norm) if norm > largest else vector
 
 
@@ -91,8 +97,8 @@ def hand_twist(tool: Pose, goal: Pose, gains: Gains, pace: float = 1.0) -> Float
 
     `v = sat(gain (p_goal - p))`, `ω = sat(gain log(R_goal Rᵀ))`; `pace` scales the largest speeds.
     """
-    linear, angular = np.split(gains.gain * hand_errors(tool, goal), 2)
-    speeds = saturated(linear, pace * gains.hand_speed), saturated(angular, pace * gains.hand_rate)
+    wanted = gains.gain * hand_errors(tool, goal)
+    speeds = saturated(wanted[:3], pace * gains.hand_speed), saturated(wanted[3:], pace * gains.hand_rate)
     return np.concatenate(speeds)
 
 
@@ -104,8 +110,8 @@ def hand_errors(tool: Pose, goal: Pose) -> FloatArray:
 
 def pose_errors(tool: Pose, goal: Pose) -> tuple[float, float]:
     """Return distance [m] and angle [rad] between two poses."""
-    way, turn = np.split(hand_errors(tool, goal), 2)
-    return float(np.linalg.norm(way)), float(np.linalg.norm(turn))
+    errors = hand_errors(tool, goal)
+    return length(errors[:3]), length(errors[3:])
 
 
 def base_errors(q: FloatArray, goal: FloatArray) -> FloatArray:
