@@ -12,7 +12,7 @@ from handrail.collect.cockpit.nearest import NearestPair
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.world.env import HandrailEnv
-from handrail.collect.world.task import Aimed, TaskState
+from handrail.collect.world.task import TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
@@ -135,9 +135,9 @@ class Snapshots:
 
     def _aim(self, state: TaskState) -> dict[str, Any] | None:
         """Return where the hand is to be brought, if the task says that."""
-        if not isinstance(self._env.task, Aimed):
-            return None
         aim = self._env.task.aim(state)
+        if aim is None:
+            return None
         turn = [] if aim.rotation is None else quaternion_from_matrix(aim.rotation)
         pose = np.round(np.concatenate([aim.position, turn]), 4).tolist()
         return {"name": aim.name, "pose": pose, "distance": aim.distance, "angle": round(aim.angle, 4)}

@@ -119,22 +119,9 @@ class ClientPlant(Plant):
                     return
                 self._link.exchange(())
 
-    def checkpoint(self) -> object:
-        """Return nothing: there is no way back."""
-        return None
-
-    def restore(self, checkpoint: Any) -> None:
-        """Refuse."""
-        raise HandrailError("a robot that is no simulation cannot be put back to where it was")
-
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> Mapping[str, NDArray[np.uint8]]:
         """Return what its cameras see, (height, width, 3) each."""
         return self._link.pictures(cameras, size)
-
-    @property
-    def time(self) -> float:
-        """Since the episode began [s]."""
-        return self.state().time
 
     @property
     def opening(self) -> float:

@@ -76,7 +76,7 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
     units = robot_units("lekiwi", model.description)
     task = resolved(TASKS.find(config.task).task)()
     render = "rgb_array" if config.cameras else None
-    env = HandrailEnv(task, model, fps=_FPS, render_mode=render, observes=False)
+    env = HandrailEnv(task, model, fps=_FPS, render_mode=render)
     body, sockets = LeKiwiBody(env, units), HostSockets(config)
     loop = LeKiwiLoop(body, config, time.monotonic())
     say(

@@ -1,7 +1,7 @@
 """The Gymnasium environment: a robot, a task, velocities in, observations out."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,8 @@ from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.world.observation import AgentObservation, bounded, box_space
-from handrail.collect.world.plant import Plant, Seeing
-from handrail.collect.world.rendering import CAMERAS, Painter
+from handrail.collect.world.plant import Plant
+from handrail.collect.world.rendering import Painter
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Start, Task, TaskState, Verdict
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -23,7 +23,6 @@ from handrail.controllers.robot.shape import Obstacle
 
 Observation = dict[str, Any]
 RENDER_SIZE = (480, 640)  # height, width [px]
-_NOTHING = np.zeros(0, dtype=np.float32)
 
 
 class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -43,7 +42,6 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: `rgb_array` or None.
         render_size: height and width of what `render` returns [px].
         sample: draws how an episode begins, `(model, rng)`, instead of the task.
-        observes: whether there is anything in observations; without, steps are quicker.
         real: whether a step takes its time, as of a robot that is no simulation: there is no way back.
 
     Attributes:
@@ -69,14 +67,10 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: str | None = None,
         render_size: tuple[int, int] = RENDER_SIZE,
         sample: Callable[[RobotModel, np.random.Generator], Start] | None = None,
-        observes: bool = True,
         real: bool = False,
     ) -> None:
         if not 10 <= fps <= 100:
             raise HandrailError(f"fps {fps}: expected 10 to 100 steps a second")
-        for camera in cameras:
-            if camera not in CAMERAS:
-                raise unknown_name("camera", camera, CAMERAS)
         if render_mode not in (None, "rgb_array"):
             raise unknown_name("render mode", render_mode, ("rgb_array",))
         self.task: Task = load_env_creator(task)() if isinstance(task, str) else task  # pyright: ignore
@@ -86,7 +80,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
-        self._build, self._observes = plant, observes
+        self._build = plant
         self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)
         self.agent_names, self.state_names = self._agent.names, self.task.state_names
@@ -102,7 +96,6 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.observation_space = spaces.Dict(seen)
         self._painters: dict[str, Painter] = {}
         self._begun: tuple[Start, Plant] | None = None
-        self._steps = 0
 
     @property
     def _episode(self) -> tuple[Start, Plant]:
@@ -197,20 +190,16 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "contact_names": contacts,
             "time": state.time,
         }
-        if not self._observes:
-            return {"agent_pos": _NOTHING, "environment_state": _NOTHING}, info
         observation: Observation = {
             "agent_pos": self._agent.read(self.seen[0], state.tool, state.opening),
             "environment_state": bounded(self.task.features(state)),
         }
-        if self.cameras:
-            observation["pixels"] = self._pictures()
+        cameras, size = self.cameras, self.image_size
+        if cameras and self.real:
+            observation["pixels"] = self.plant.pictures(cameras, size)
+        elif cameras:
+            observation["pixels"] = {camera: self._paint("pixels", camera, size) for camera in cameras}
         return observation, info
-
-    def _pictures(self) -> Mapping[str, NDArray[np.uint8]]:
-        if isinstance(self.plant, Seeing):
-            return self.plant.pictures(self.cameras, self.image_size)
-        return {camera: self._paint("pixels", camera, self.image_size) for camera in self.cameras}
 
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""

@@ -52,7 +52,7 @@ class IdealRobot(Plant):
 
     def state(self) -> State:
         """Return position, velocity and time."""
-        return State(self._q, self._gate.velocity, self.time, self._gate.velocity)
+        return State(self._q, self._gate.velocity, self._steps * self._step, self._gate.velocity)
 
     def send(self, command: ArrayLike) -> NDArray[np.floating]:
         """Move by `½ h (v + v⁺)`; return what was sent."""
@@ -77,15 +77,6 @@ class IdealRobot(Plant):
         self._gate.restore(sent)
         self._collision.update_scene(self.obstacles())
         self._distances = self._collision.values(self._q[None])[0]
-
-    def stop(self) -> None:
-        """Brake until it rests."""
-        self._gate.bring_to_rest(self)
-
-    @property
-    def time(self) -> float:
-        """Since the episode began [s]."""
-        return self._steps * self._step
 
     @property
     def opening(self) -> float:

@@ -3,12 +3,13 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -49,22 +50,27 @@ class Plant(ABC):
                 of another size, or that is not finite, brakes.
         """
 
-    @abstractmethod
     def stop(self) -> None:
         """Come to rest as fast as the limits allow, and stay there; the gripper stays as it is."""
+        while self.state().commanded.any():
+            self.send(())
 
-    @abstractmethod
     def checkpoint(self) -> object:
-        """Return the whole state, robot and things, to come back to."""
+        """Return the whole state, robot and things, to come back to; None where there is no way back."""
+        return None
 
-    @abstractmethod
     def restore(self, checkpoint: Any) -> None:
         """Come back to a state: from there all goes on as it did."""
+        raise HandrailError("a robot that is no simulation cannot be put back to where it was")
+
+    def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> Mapping[str, NDArray[np.uint8]]:
+        """Return what cameras of its own see, (height, width, 3) each, in a size (height, width) [px]."""
+        raise HandrailError("a simulation is drawn, it has no cameras of its own")
 
     @property
-    @abstractmethod
     def time(self) -> float:
         """Since the episode began [s]."""
+        return self.state().time
 
     @property
     @abstractmethod
@@ -100,15 +106,6 @@ class Plant(ABC):
     def still(self) -> frozenset[str]:
         """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
         return frozenset()
-
-
-@runtime_checkable
-class Seeing(Protocol):
-    """A plant with cameras of its own; nobody has to draw what they see."""
-
-    def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> Mapping[str, NDArray[np.uint8]]:
-        """Return what cameras see, (height, width, 3) each, in a size (height, width) [px]."""
-        ...
 
 
 class Gate:
@@ -157,8 +154,3 @@ class Gate:
     def restore(self, state: tuple[FloatArray, float]) -> None:
         """Come back to a state."""
         self.velocity, self.gripper = state[0].copy(), state[1]
-
-    def bring_to_rest(self, plant: Plant) -> None:
-        """Send its robot nothing usable, which brakes, until it was sent rest."""
-        while np.abs(self.velocity).max() > 0.0:
-            plant.send(())

@@ -9,7 +9,6 @@ from handrail.collect.world.geometry import VISIBLE_GROUP
 from handrail.collect.world.gl import MjData, MjModel, missing_graphics, mujoco
 from handrail.controllers.errors import unknown_name
 
-CAMERAS = ("wrist", "scene")
 _MOST_GEOMS = 300
 
 

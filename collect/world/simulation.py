@@ -74,42 +74,37 @@ class Simulation(Plant):
         self.data = mujoco.MjData(self.mujoco_model)
         self._held_at = -math.inf  # what was held then is known
         self._contacts = Contacts(self.mujoco_model, scene, grasp_geoms(model), self._gripper is not None)
-        self._index()
-        self._place(q, grip)
+        self._find()
+        self.data.qpos[self._q_index] = q
+        if self._gripper:  # open, or closed around something
+            apart = self._travel if grip is None else grip * (self._travel / self._gripper.stroke)
+            self.data.qpos[self._finger_index] = apart / len(self._finger_index)
+            self.data.ctrl[self._gripper_servo] = self._gripper_target(float(grip is not None))
+        mujoco.mj_forward(self.mujoco_model, self.data)
 
-    def _index(self) -> None:
-        """Find where the robot is in MuJoCo's arrays."""
-        compiled, names = self.mujoco_model, self._model.joints
+    def _find(self) -> None:
+        """Find where the robot and what moves by itself are in MuJoCo's arrays."""
+        compiled, names, gripper = self.mujoco_model, self._model.joints, self._gripper
         self._q_index = _span([compiled.joint(name).qposadr[0] for name in names])
         self._v_index = _span([compiled.joint(name).dofadr[0] for name in names])
         self._servo_index = np.array([compiled.actuator(name).id for name in names])
         self._tool = compiled.site("tool").id
-        self._gripper_servo, self._travel, self._beyond, reach = -1, 0.0, 0.0, 0.0
-        if self._gripper:
-            fingers = FINGERS if self._gripper.jaw is None else FINGERS[:1]
+        if gripper:
+            fingers = FINGERS if gripper.jaw is None else FINGERS[:1]
             self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in fingers])
             self._gripper_servo = compiled.actuator("gripper").id
-            self._travel, self._beyond = self._gripper.travel, self._gripper.beyond
-            reach = self._gripper.pace * self._step
-        self._reach = reach  # of the fingers in a step
-        movers = [(int(compiled.body(item.name).mocapid[0]), item.patrol) for item in self._scene.movers]
-        self._patrols = [(body, patrol) for body, patrol in movers if patrol]
+            self._travel = gripper.travel
+            self._reach = gripper.pace * self._step * self._shares  # of the fingers in a step
+        moving = ((item.name, item.patrol) for item in self._scene.objects if item.patrol)
+        self._patrols = [(int(compiled.body(name).mocapid[0]), patrol) for name, patrol in moving]
         self._bodies = {item.name: int(compiled.body(item.name).id) for item in self._scene.objects}
         self._speeds = {item.name: self.data.joint(item.name).qvel for item in self._scene.movables}
-
-    def _place(self, q: FloatArray, grip: float | None) -> None:
-        """Put the robot at q, the gripper open, or closed around something of width `grip` [m]."""
-        self.data.qpos[self._q_index] = q
-        if self._gripper:
-            apart = self._travel if grip is None else grip * (self._travel / self._gripper.stroke)
-            self.data.qpos[self._finger_index] = apart / len(self._finger_index)
-            self.data.ctrl[self._gripper_servo] = self._gripper_target(0.0 if grip is None else 1.0)
-        mujoco.mj_forward(self.mujoco_model, self.data)
 
     def show(self, q: FloatArray) -> None:
         """Put the robot at q, (n,), at rest, for a picture; no time passes."""
         self.data.qpos[self._q_index] = q
         self.data.qvel[:] = 0.0
+        self._held_at = -math.inf
         self._see()
 
     def _see(self) -> None:
@@ -123,25 +118,25 @@ class Simulation(Plant):
         Args:
             command: velocities at the end of the step [m/s, rad/s] and gripper, (n + 1,).
         """
-        contacts, patrols, before = self._contacts, self._patrols, self._gate.velocity
+        contacts, model, data = self._contacts, self.mujoco_model, self.data
         contacts.clear()
-        model, data, control = self.mujoco_model, self.data, self.data.ctrl
+        before = self._gate.velocity
         sent = self._gate.limit(command, data.qpos[self._q_index])
-        fingers = self._gripper_servo, self._gripper_target(float(sent[-1])), self._reach
-        after, shares = self._gate.velocity, self._shares
-        for control[:] in _ramp(data.ctrl, before, after, shares, self._servo_index, fingers):
-            if patrols:
-                self._move_obstacles()
+        ramp = np.empty((len(self._shares), len(data.ctrl)))
+        ramp[:, self._servo_index] = np.outer(1.0 - self._shares, before)
+        ramp[:, self._servo_index] += np.outer(self._shares, self._gate.velocity)
+        if self._gripper:
+            now, reach = data.ctrl[self._gripper_servo], self._reach
+            way = self._gripper_target(float(sent[-1])) - now
+            ramp[:, self._gripper_servo] = now + np.minimum(np.maximum(way, -reach), reach)
+        for data.ctrl[:] in ramp:
+            self._move_obstacles()
             mujoco.mj_step(model, data)
             if data.ncon:
                 contacts.look(data)
         self._move_obstacles()
         self._see()
         return sent
-
-    def stop(self) -> None:
-        """Brake until the robot is sent rest."""
-        self._gate.bring_to_rest(self)
 
     def checkpoint(self) -> object:
         """Return the whole state, to come back to."""
@@ -176,7 +171,8 @@ class Simulation(Plant):
 
     def _gripper_target(self, gripper: float) -> float:
         """Return the opening that the gripper's servo is sent to [m, rad]; closed is a little beyond it."""
-        return (1.0 - gripper) * self._travel - self._beyond * gripper
+        assert self._gripper
+        return (1.0 - gripper) * self._travel - self._gripper.beyond * gripper
 
     def _move_obstacles(self) -> None:
         """Put what moves by itself where it is now."""
@@ -187,11 +183,6 @@ class Simulation(Plant):
         """Return the measured positions and velocities, and what was commanded last."""
         data = self.data
         return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self._gate.velocity)
-
-    @property
-    def time(self) -> float:
-        """Since the episode began [s]."""
-        return float(self.data.time)
 
     @property
     def tool(self) -> Pose:
@@ -236,27 +227,6 @@ class Simulation(Plant):
 def _pose(position: FloatArray, rotation: FloatArray) -> Pose:
     """Return a copy of where something is in MuJoCo's arrays, (3,) and (9,)."""
     return Pose(position.copy(), rotation.reshape(3, 3).copy())
-
-
-def _ramp(
-    control: FloatArray,
-    before: FloatArray,
-    after: FloatArray,
-    shares: FloatArray,
-    servos: IntArray,
-    fingers: tuple[int, float, float],
-) -> FloatArray:
-    """Return what servos are sent at every substep, (substeps, servos).
-
-    That is on the way from one velocity to another; the fingers' servo goes towards their opening.
-    """
-    ramp = np.empty((len(shares), len(control)))
-    ramp[:, servos] = np.outer(1.0 - shares, before) + np.outer(shares, after)
-    finger, opening, reach = fingers
-    if finger >= 0:
-        way = opening - control[finger]
-        ramp[:, finger] = control[finger] + np.minimum(np.maximum(way, -(reach * shares)), reach * shares)
-    return ramp
 
 
 def _span(places: list[int]) -> slice | IntArray:

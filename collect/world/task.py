@@ -1,8 +1,9 @@
 """What a task is: it samples an episode, names its state, and judges the outcome; what tasks share."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,74 +91,52 @@ class Aim:
     angle: float = 0.0  # likewise [rad]
 
 
-class Task(Protocol):
+class Task(ABC):
     """A task: a frozen dataclass in its own file, with one entry in `collect/world/tasks/catalogue.py`."""
 
-    @property
-    def description(self) -> str:
-        """One sentence: what to do; LeRobot's `task` string."""
-        ...
-
-    @property
-    def horizon(self) -> float:
-        """Time after which an episode is given up [s]."""
-        ...
+    description: str  # one sentence: what to do; LeRobot's `task` string
+    horizon: float  # time after which an episode is given up [s]
+    stages: ClassVar[tuple[str, ...]] = ()
+    """Names of the stages in which it is done, one after the other, if it has any."""
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the numbers in `environment_state`, (k,)."""
-        ...
+        return ()
 
+    @abstractmethod
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Return the beginning of an episode."""
-        ...
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the `environment_state`, (k,), in [m], wxyz quaternions."""
-        ...
+        return np.zeros(0)
 
+    @abstractmethod
     def outcome(self, state: TaskState) -> Verdict:
         """Judge a moment."""
-        ...
 
-
-@runtime_checkable
-class Aimed(Protocol):
-    """A task that says where the hand is to be brought."""
-
-    def aim(self, state: TaskState) -> Aim:
-        """Return where to at a moment."""
-        ...
-
-
-@runtime_checkable
-class Staged(Protocol):
-    """A task that is done in stages, one after the other: their names in order."""
-
-    stages: tuple[str, ...]
+    def aim(self, state: TaskState) -> Aim | None:
+        """Return where the hand is to be brought at a moment, if the task says that."""
+        return None
 
     def stage(self, state: TaskState) -> str:
-        """Return which of them is to be done at a moment."""
-        ...
+        """Return which of the stages is to be done at a moment."""
+        return ""
 
 
 @dataclass(frozen=True)
-class FixedTask:
+class FixedTask(Task):
     """A task without anything random: how every episode begins, and a judge that says how it stands."""
 
     begin: Start
     judge: Callable[[TaskState], Verdict]
     horizon: float  # time limit [s]
     description: str = ""
-    state_names: tuple[str, ...] = ()
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Return the beginning."""
         return self.begin
-
-    def features(self, state: TaskState) -> FloatArray:
-        """Return no features, (0,)."""
-        return np.zeros(0)
 
     def outcome(self, state: TaskState) -> Verdict:
         """Return what the judge says."""

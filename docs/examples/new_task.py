@@ -10,19 +10,23 @@ import numpy as np
 
 from handrail.collect import SessionConfig, build_env, build_session
 from handrail.collect.world.scene import Scene, SceneObject
-from handrail.collect.world.task import Start, TaskState, Verdict
+from handrail.collect.world.task import Start, Task, TaskState, Verdict
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers import Pose, RobotModel, Shape
 from handrail.controllers.arrays import FloatArray
 
 
 @dataclass(frozen=True)
-class TouchBall:
+class TouchBall(Task):
     """Bring the tip of the hand within 5 cm of a ball that hangs in front of the robot."""
 
     description: str = "Touch the ball."
     horizon: float = 20.0  # [s]
-    state_names: tuple[str, ...] = ("ball.x", "ball.y", "ball.z")
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of what `features` returns."""
+        return ("ball.x", "ball.y", "ball.z")
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Hang the ball somewhere in front of the robot; nothing else is there."""

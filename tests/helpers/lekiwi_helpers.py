@@ -34,7 +34,7 @@ class PlayedClient:
         self, silent: tuple[float, float] = (0.0, 0.0), cameras: dict[str, Any] | None = None
     ) -> None:
         self.clock, self.silent, self.cameras = Clock(), silent, cameras or {}
-        env = HandrailEnv(Reach(), "lekiwi", fps=60, observes=False)
+        env = HandrailEnv(Reach(), "lekiwi", fps=60)
         self.body = LeKiwiBody(env, robot_units("lekiwi", env.model.description))
         self.sent: list[dict[str, Any]] = []
         self.connected, self.stubborn, self.leap = False, False, 0.0
@@ -75,7 +75,7 @@ class FarClient:
 
     def __init__(self, latency: float, drop: float, seed: int) -> None:
         self.clock = Clock()
-        env = HandrailEnv(PickPlace(), "lekiwi", fps=60, observes=False)
+        env = HandrailEnv(PickPlace(), "lekiwi", fps=60)
         self.body = LeKiwiBody(env, robot_units("lekiwi", env.model.description))
         config = HostConfig(task="pick_place", latency=latency, drop=drop, seed=seed)
         self.loop = LeKiwiLoop(self.body, config, self.clock.now)
@@ -130,7 +130,7 @@ def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: floa
     def plant(robot, scene, q, period, **looks):
         return ClientPlant(robot, scene, q, link, seed)
 
-    env = HandrailEnv(PickPlace(), "lekiwi", fps=20, observes=False, real=True, plant=plant)
+    env = HandrailEnv(PickPlace(), "lekiwi", fps=20, real=True, plant=plant)
     env.reset(seed=seed)
     mpc = MaskedMpc(model)
     mpc.reset(env.plant.obstacles())

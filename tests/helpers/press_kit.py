@@ -10,7 +10,7 @@ from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.scripted import scripted_operator
 from handrail.collect.operators.scripted.steering import MotionGoal, Target, hand_twist
 from handrail.collect.world.scene import Scene
-from handrail.collect.world.task import Start, Verdict
+from handrail.collect.world.task import Start, Task, Verdict
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
@@ -19,7 +19,7 @@ from handrail.controllers.robot.model import Pose
 
 
 @dataclass(frozen=True)
-class Press:
+class Press(Task):
     """Bring the tool within 4 cm of a button near it."""
 
     description: str = "Press the button."

@@ -9,6 +9,7 @@ from handrail.collect.world.scene import Scene, SceneObject, Slide, Viewpoint, b
 from handrail.collect.world.task import (
     Aim,
     Start,
+    Task,
     TaskState,
     Verdict,
     check_large,
@@ -78,7 +79,7 @@ def inward(rotation: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Drawer:
+class Drawer(Task):
     """A cabinet that is out of reach at first, turned by up to 0.3 rad; the handle is at 0.64 to 0.83 m.
 
     Success: the drawer open by 0.20 m of its 0.35 m, the gripper let go and away from the handle.

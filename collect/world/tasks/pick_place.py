@@ -1,7 +1,6 @@
 """Fetch a cube from one table and put it into a bin on another, past obstacles on the floor."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.world.task import (
     Aim,
     Start,
+    Task,
     TaskState,
     Verdict,
     hand_rotation,
@@ -41,7 +41,7 @@ _VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
 
 @dataclass(frozen=True)
-class PickPlace:
+class PickPlace(Task):
     """The tables are 2.7 m · scale apart, farther than the arm reaches, so the base has to drive.
 
     Success: the cube at rest inside the bin, the gripper open and away from it.
@@ -52,7 +52,7 @@ class PickPlace:
     horizon: float = 90.0  # time limit [s]
     clearance: float = 0.15
     """Between the robot's start and anything on the floor, and between obstacles, at scale 1 [m]."""
-    stages: ClassVar = ("approach", "grasp", "lift", "carry", "place")
+    stages = ("approach", "grasp", "lift", "carry", "place")
 
     @property
     def state_names(self) -> tuple[str, ...]:

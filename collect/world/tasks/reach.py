@@ -1,13 +1,12 @@
 """Reach a pose with the tool: the benchmark of the paper's Table I."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from handrail.collect.world.observation import padded, pose_names, pose_numbers, row_names
 from handrail.collect.world.scene import Part, Patrol, Scene, SceneObject, Viewpoint
-from handrail.collect.world.task import Aim, Start, TaskState, Verdict
+from handrail.collect.world.task import Aim, Start, Task, TaskState, Verdict
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.goal_reaching import (
     ANGLE_TOLERANCE,
@@ -103,7 +102,7 @@ def _rotation(pitch: tuple[float, float], roll: tuple[float, float], rng: np.ran
 
 
 @dataclass(frozen=True)
-class Reach:
+class Reach(Task):
     """Goals uniform in x, y ∈ [−1, 1] m, z ∈ [0.7, 1.0] m, with a random orientation; start at home.
 
     Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`. Lengths are made to the
@@ -114,7 +113,7 @@ class Reach:
     horizon: float = 30.0  # time limit [s]
     moving_obstacles: int = 0
     """How many cylinders cross the robot's way; goals are the same with and without."""
-    stages: ClassVar = ("approach", "turn")
+    stages = ("approach", "turn")
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.world.task import (
     Aim,
     Start,
+    Task,
     TaskState,
     Verdict,
     check_large,
@@ -42,7 +43,7 @@ HANDLE = np.array([0.0, 0.0, _SIZE[2]])  # centre of the handle's bar in the tra
 
 
 @dataclass(frozen=True)
-class Tray:
+class Tray(Task):
     """The robot starts with the tray's handle in its gripper; nothing fastens the can.
 
     Success: the tray at rest on the table, the can standing on it, the gripper open and away.

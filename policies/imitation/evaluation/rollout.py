@@ -15,7 +15,6 @@ from handrail.collect.session.disturbances import DelayedOperator, Pusher
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.world.env import HandrailEnv
-from handrail.collect.world.task import Staged
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.unprotected import unprotected_controller
@@ -47,7 +46,7 @@ class RolloutProgress:
         """Look at the truth of this moment."""
         state, task = self._env.task_state(), self._env.task
         self._tools.append(state.tool.position)
-        if isinstance(task, Staged):
+        if task.stages:
             self._stage = task.stages.index(task.stage(state))
             self._furthest = max(self._furthest, self._stage)
 
@@ -57,7 +56,7 @@ class RolloutProgress:
         `dropped`: what it had in hand; `stalled`: the tool stayed within 5 cm for the last 5 s; `moving`.
         """
         task = self._env.task
-        named = {"stage": task.stages[self._furthest]} if isinstance(task, Staged) else {}
+        named = {"stage": task.stages[self._furthest]} if task.stages else {}
         if outcome.failure_reason == "dropped" or self._fell_back:
             return named | {"ended": "dropped"}
         extent = float(np.linalg.norm(np.ptp(np.array(self._tools), axis=0)))
@@ -67,10 +66,8 @@ class RolloutProgress:
     @property
     def _fell_back(self) -> bool:
         """Whether what had been lifted is in the hand no more."""
-        task = self._env.task
-        if not isinstance(task, Staged) or "carry" not in task.stages:
-            return False
-        return self._stage < task.stages.index("carry") <= self._furthest
+        stages = self._env.task.stages
+        return "carry" in stages and self._stage < stages.index("carry") <= self._furthest
 
 
 def run_rollout(

@@ -24,7 +24,7 @@ class Hosted:
     """A host whose time a test lets pass; any robot on wheels will do."""
 
     def __init__(self, **settings) -> None:
-        env = HandrailEnv(Reach(), "ridgeback_ur10", fps=60, observes=False)
+        env = HandrailEnv(Reach(), "ridgeback_ur10", fps=60)
         self.body = LeKiwiBody(env, robot_units("lekiwi", env.model.description))
         self.loop = LeKiwiLoop(self.body, replace(HostConfig(), **settings), 0.0)
         self.now, self.answers, self.times = 0.0, [], []

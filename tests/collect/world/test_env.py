@@ -150,7 +150,7 @@ def test_wrong_options_are_named(options, message):
     from handrail.collect.world.env import HandrailEnv
 
     with pytest.raises(HandrailError, match=message):
-        HandrailEnv("handrail.collect.world.tasks.reach:Reach", **options)
+        HandrailEnv("handrail.collect.world.tasks.reach:Reach", **options).reset(seed=0)
 
 
 def test_before_reset_there_is_nothing_to_see():

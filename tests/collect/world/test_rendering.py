@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from handrail.collect.config import SessionConfig
+from handrail.collect.config import CAMERAS, SessionConfig
 from handrail.collect.session.build import build_env
-from handrail.collect.world.rendering import CAMERAS, Painter
+from handrail.collect.world.rendering import Painter
 from handrail.controllers.errors import HandrailError
 
 
