@@ -92,7 +92,7 @@ def run_rollout(
     controller = _controller(condition.protection, meta.intent_mode, meta.environment, env)
     policy = _policy(checkpoint.folder, checkpoint.digest, load)
     channels = Channels.of(env.model.description)
-    interface = policy.interface or RecordedColumns.of(meta, checkpoint.joined)
+    interface = meta.interface or RecordedColumns.of(meta, checkpoint.joined)
     with threads(1), repeatable(seed):
         operator = PolicyOperator(policy, interface, channels, meta.mode, env.task.description)
         late = DelayedOperator(operator, perturbation.delay)

@@ -12,7 +12,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypedDict
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
@@ -33,14 +33,20 @@ Fps = Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])]
 RobotName = Annotated[str, Meta(max_length=200, pattern=r"\A[\w+:,.\- ]*(?<!\.toml)\Z")]
 
 
-class TrainingSizes(TypedDict, total=False):
-    """What a training really used where its settings say 0, a preset's (`Preset`)."""
+@dataclass(frozen=True)
+class TrainingSizes:
+    """Sizes of a policy and of its training: a preset's, and over it what the settings say."""
 
-    options: dict[str, Any]
-    lr: float
-    cosine: bool
-    steps: Count
-    batch_size: Count
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Of the policy, as LeRobot calls them."""
+    lr: NonNegative = 1e-4
+    """Highest learning rate."""
+    cosine: bool = False
+    """Whether the learning rate falls along a cosine; else as the policy has it."""
+    steps: Count = 100_000
+    """Updates."""
+    batch_size: Count = 64
+    """Samples an update."""
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,10 @@ It writes the joint velocities that came about, or the operator's own command: b
 the base's axes like what the policy sees. Whatever comes out, the robot's limits bound it.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Literal
 
 import numpy as np
@@ -17,7 +18,15 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent, decided_gripper
 from handrail.controllers.typed import Text
 from handrail.datasets.format.schema import Feature
-from handrail.policies.imitation.interface.relative import RelativeView
+from handrail.policies.imitation.interface.relative import (
+    BASE_SEEN,
+    TOOL,
+    TOOL_SEEN,
+    RobotPose,
+    rotations,
+    seen,
+    seen_names,
+)
 
 Columns = Mapping[str, np.ndarray]
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
@@ -44,11 +53,14 @@ class PolicyInterface:
     """Whether it sees where the base is; older checkpoints do not say, and do not."""
 
     def __post_init__(self) -> None:
-        """Check the masks."""
+        """Check the masks, and that what the view starts from is there."""
         count = len(self.channels)
         if {len(mask) for mask in self.masks} != ({count} if self.actions == "intent" else set()):
             words = f"of {count} channels each for an intent and none else"
             raise HandrailError(f"masks: expected some {words}, got {shown(self.masks)} for {self.actions}")
+        if missing := [name for name in self._needed if name not in self.state_names]:
+            words = f"expected that of handrail-record; no {', '.join(missing)}"
+            raise HandrailError(f"observation.state: {words}")
 
     @classmethod
     def of_dataset(
@@ -79,7 +91,9 @@ class PolicyInterface:
     @property
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of what the policy reads: state, environment."""
-        return self._view.names
+        base = BASE_SEEN if self._shows_base else ()
+        around = (f"{name}.{part}" for name, parts, _ in self._objects for part in seen_names(parts))
+        return (*self._own, *TOOL_SEEN, *base), tuple(around)
 
     @property
     def action_names(self) -> tuple[str, ...]:
@@ -95,9 +109,15 @@ class PolicyInterface:
     def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what the policy reads, ([T,] s') and ([T,] e') float32, of what is recorded."""
         if state.ndim == 1:
-            seen = self._view(state[None], environment[None])
-            return seen[0][0], seen[1][0]
-        return self._view(state, environment)
+            numbers = self.observe(state[None], environment[None])
+            return numbers[0][0], numbers[1][0]
+        state, environment = np.asarray(state, float), np.asarray(environment, float)
+        pose = self._pose(state)
+        own = [self._of(state, self._own), pose.tool_seen, *([pose.base_seen] if self._shows_base else [])]
+        around: list[FloatArray] = [np.zeros((len(state), 0))]
+        for _, parts, start in self._objects:
+            around.append(seen(parts, environment[:, start : start + len(parts)], pose))
+        return np.column_stack(own).astype(np.float32), np.column_stack(around).astype(np.float32)
 
     def encode(self, columns: Columns) -> FloatArray:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
@@ -105,10 +125,11 @@ class PolicyInterface:
         if self.masks:
             values, gripper = np.split(columns[VALUES].astype(float), [-1], axis=1)
         else:  # the next frame's joint velocities, the last frame's its own
-            velocities, gripper = self._view.velocities(state), columns[ACTION][:, -1]
+            velocities = self._of(state, [f"{joint}.vel" for joint in self._joints])
+            gripper = columns[ACTION][:, -1]
             values = np.zeros((len(state), len(self.channels)))
             values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
-        pose = self._view.pose(state)
+        pose = self._pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
         rows = columns[MASK][:, : len(self.channels)].astype(bool)
@@ -118,7 +139,7 @@ class PolicyInterface:
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
         action, state = np.asarray(action, float), np.asarray(state, float)[None]
-        pose = self._view.pose(state)
+        pose = self._pose(state)
         values, count = np.zeros((1, len(self.channels))), len(self._commanded)
         values[0, self._commanded] = action[:count]
         for pair in self._pairs:
@@ -142,11 +163,45 @@ class PolicyInterface:
         return Channels(*parts)
 
     @cached_property
-    def _view(self) -> RelativeView:
-        joints = tuple(name.removeprefix("joint.") for name in self._known.joints)
-        return RelativeView(
-            self.state_names, self.environment_names, joints, bool(self._known.base), self.base_pose
+    def _joints(self) -> tuple[str, ...]:
+        return tuple(name.removeprefix("joint.") for name in self._known.joints)
+
+    @property
+    def _needed(self) -> tuple[str, ...]:
+        return (*TOOL, *(f"{joint}.{kind}" for joint in self._joints for kind in ("pos", "vel")))
+
+    @property
+    def _shows_base(self) -> bool:
+        return self.base_pose and bool(self._known.base)
+
+    @cached_property
+    def _own(self) -> tuple[str, ...]:
+        """The arm's joints, and numbers of the state that are neither a joint's nor the tool's."""
+        arm = self._joints[3:] if self._known.base else self._joints
+        others = (name for name in self.state_names if name not in self._needed)
+        return (*(f"{joint}.pos" for joint in arm), *others)
+
+    @cached_property
+    def _objects(self) -> list[tuple[str, tuple[str, ...], int]]:
+        """Neighbouring numbers of the environment whose names begin alike: name, parts, where they begin."""
+        found, split = (
+            list[tuple[str, tuple[str, ...], int]](),
+            [n.rpartition(".") for n in self.environment_names],
         )
+        for name, group in groupby(split, key=lambda each: each[0]):
+            found.append((name, tuple(part for *_, part in group), sum(len(parts) for _, parts, _ in found)))
+        return found
+
+    def _pose(self, state: FloatArray) -> RobotPose:
+        """Return where the robot is, from recorded states, (T, s)."""
+        base = np.zeros((len(state), 3))
+        if self._known.base:
+            base = self._of(state, [f"{joint}.pos" for joint in self._joints[:3]])
+        tool = self._of(state, TOOL)
+        return RobotPose(base, tool[:, :3], rotations(tool[:, 3:]))
+
+    def _of(self, state: FloatArray, names: Sequence[str]) -> FloatArray:
+        return state[:, [self.state_names.index(name) for name in names]]
 
     @cached_property
     def _sets(self) -> tuple[tuple[bool, ...], ...]:

@@ -8,7 +8,7 @@ recorded columns ─ view ─▶ normalise ─▶ policy ─▶ unnormalise ─ 
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -19,10 +19,19 @@ from lerobot.lerobot_types import EnvTransition, TransitionKey
 from lerobot.processor import ProcessorStep, ProcessorStepRegistry
 from lerobot.processor.normalize_processor import NormalizerProcessorStep
 
+from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_controller
+from handrail.collect.world.observation import from_numbers
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.typed import decoded
-from handrail.policies.imitation.interface.completion import CompletedRobot, Completion
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.typed import Name, decoded
+from handrail.policies.imitation.interface.checkpoint import Fps
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import ACT, COMPLETE, VIEW
 
@@ -30,6 +39,64 @@ AROUND = tuple(f"observation.{name}" for name in ("time", "sent", "obstacles"))
 Features = dict[PipelineFeatureType, dict[str, PolicyFeature]]
 _views: "WeakValueDictionary[PolicyInterface, PolicyViewStep]" = WeakValueDictionary()
 """The step that sees, of the preprocessor loaded last: LeRobot loads those that act apart from it."""
+
+
+@dataclass(frozen=True)
+class Completion:
+    """What completes the intents of a policy into the whole robot's motion: its mode's own controller."""
+
+    robot: Name
+    task: Name
+    """The controller knows the objectives that it brings."""
+    mode: Name
+    fps: Fps
+    """Intents a second [Hz]."""
+
+
+class CompletedRobot:
+    """One robot and its controller; an environment of several has as many.
+
+    Args:
+        interface: what the policy reads and writes.
+        by: what completes that; a name that would be imported is refused.
+    """
+
+    def __init__(self, interface: PolicyInterface, by: Completion) -> None:
+        for registry, name in ((ROBOTS, by.robot), (TASKS, by.task), (MODES, by.mode)):
+            registry.admit(name)
+        model = load_model(by.robot)
+        if Channels.of(model.description).names != interface.channels:
+            raise HandrailError(f"completion of intents: expected the channels of {by.robot}, got others")
+        self._interface, self._by, self._n = interface, by, model.size
+        self._controller = build_controller(MODES.find(by.mode), model, by.fps, by.task)
+        self._time, self._around = np.inf, b""
+
+    def velocities(
+        self, action: FloatArray, state: FloatArray, time: FloatArray, sent: FloatArray, around: FloatArray
+    ) -> FloatArray:
+        """Return velocities and gripper, (n + 1,); an episode begins where the time is not later.
+
+        Args:
+            action: of the policy, (a,); one that is not finite brakes.
+            state: as recorded, (s,).
+            time: of the episode, (1,) [s].
+            sent: velocities that were sent last, (n,).
+            around: the obstacles, as numbers.
+        """
+        now, n = float(time[0]), self._n
+        if now <= self._time:
+            self._controller.reset(from_numbers(around))
+        elif around.tobytes() != self._around:
+            self._controller.update_scene(from_numbers(around))
+        self._time, self._around = now, around.tobytes()
+        intent = Intent(
+            np.full(len(self._interface.channels), np.nan), np.ones(len(self._interface.channels), bool)
+        )
+        if np.all(np.isfinite(action)):
+            intent = self._interface.decode(action, state)
+        asked = replace(intent, mode=self._by.mode, time=now)
+        command = self._controller.update(State(state[:n], state[n : 2 * n], now, sent), asked)
+        return np.append(command.velocity(1.0 / self._by.fps), command.gripper)
 
 
 @dataclass(eq=False)
@@ -45,7 +112,7 @@ class PolicyStep(ProcessorStep):
 
     def get_config(self) -> dict[str, Any]:
         """Return what makes this step again."""
-        return {"interface": self.interface}
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def transform_features(self, features: Features) -> Features:
         """Return the features as they are: LeRobot asks the steps of robots for theirs, never a policy's."""
@@ -53,40 +120,39 @@ class PolicyStep(ProcessorStep):
 
 
 @ProcessorStepRegistry.register(VIEW)
-@dataclass(eq=False)
 class PolicyViewStep(PolicyStep):
     """Shows a policy what is recorded as it learnt to see it: relative poses, no velocities of its own.
 
     A robot of LeRobot's, such as `handrail_sim`, shows robot and scene as one vector, `observation.state`.
     """
 
-    raw: Mapping[str, Any] = field(default_factory=dict, init=False, repr=False)
+    raw: Mapping[str, Any]
     """The observation that was seen last, before it was changed."""
-    state: FloatArray | None = field(default=None, init=False, repr=False)
+    state: FloatArray | None
     """As recorded, of that moment, (B, s); None before any."""
 
     def __post_init__(self) -> None:
         """Let the step that acts find this one."""
         super().__post_init__()
+        self.reset()
         _views[self.seen] = self
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
         """Return what the policy reads."""
         raw = dict(transition.get(TransitionKey.OBSERVATION) or {})
-        seen, sizes = dict(raw), (len(self.seen.state_names), len(self.seen.environment_names))
-        if ENVIRONMENT not in seen and _size(seen.get(STATE)) == sum(sizes):
-            both = seen[STATE]
-            seen |= {STATE: both[..., : sizes[0]], ENVIRONMENT: both[..., sizes[0] :]}
-        state = _numbers(seen, STATE, sizes[0])
-        around = _numbers(seen, ENVIRONMENT, sizes[1]) if sizes[1] else np.zeros((len(state), 0))
-        shown = self.seen.observe(state, around)
-        for key, values in zip((STATE, ENVIRONMENT), shown, strict=True):
-            like = seen.pop(key, seen.get(STATE))
+        shown, sizes = dict(raw), (len(self.seen.state_names), len(self.seen.environment_names))
+        if ENVIRONMENT not in shown and _size(shown.get(STATE)) == sum(sizes):
+            shown[STATE], shown[ENVIRONMENT] = torch.split(shown[STATE], [*sizes], dim=-1)
+        state = _numbers(shown, STATE, sizes[0])
+        around = _numbers(shown, ENVIRONMENT, sizes[1]) if sizes[1] else np.zeros((len(state), 0))
+        device = shown[STATE].device
+        for key, values in zip((STATE, ENVIRONMENT), self.seen.observe(state, around), strict=True):
+            shown.pop(key, None)
             if values.shape[1]:
-                seen[key] = torch.as_tensor(values, device=getattr(like, "device", None))
+                shown[key] = torch.as_tensor(values, device=device)
         self.raw, self.state = raw, state
         changed: Any = transition.copy()
-        changed[TransitionKey.OBSERVATION] = seen
+        changed[TransitionKey.OBSERVATION] = shown
         return changed
 
     def reset(self) -> None:
@@ -95,7 +161,6 @@ class PolicyViewStep(PolicyStep):
 
 
 @ProcessorStepRegistry.register(ACT)
-@dataclass(eq=False)
 class PolicyActionStep(PolicyStep):
     """Turns what a policy writes, in the base's axes, into an action in those of the world.
 
@@ -110,20 +175,23 @@ class PolicyActionStep(PolicyStep):
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
         """Return the action."""
-        rows, states = self._rows(transition)
-        numbers = [self.seen.asked(row, state) for row, state in zip(rows, states, strict=True)]
-        self._check_taken(len(numbers[0]))
-        return _acting(transition, numbers)
-
-    def _rows(self, transition: EnvTransition) -> tuple[FloatArray, FloatArray]:
-        """Return what the policy writes, (B, a), and the states in which it does, (B, s)."""
         if self.view is None or self.view.state is None:
             raise self._error(f"expected the step {VIEW} to see something first, in the preprocessor")
         action, size = transition.get(TransitionKey.ACTION), len(self.seen.action_names)
         if not isinstance(action, torch.Tensor) or _size(action) != size:
             raise self._error(f"expected {size} numbers, got {getattr(action, 'shape', action)}")
         rows = action.detach().cpu().numpy().reshape(-1, size)
-        return rows, np.broadcast_to(self.view.state, (len(rows), self.view.state.shape[1]))
+        states = np.broadcast_to(self.view.state, (len(rows), self.view.state.shape[1]))
+        acted = torch.as_tensor(np.stack(self._acted(rows, states, self.view.raw)))
+        changed: Any = transition.copy()
+        changed[TransitionKey.ACTION] = acted.reshape(*action.shape[:-1], acted.shape[1])
+        return changed
+
+    def _acted(self, rows: FloatArray, states: FloatArray, raw: Mapping[str, Any]) -> list[FloatArray]:
+        """Return actions, of what a policy writes, (B, a), in some states, (B, s)."""
+        numbers = [self.seen.asked(row, state) for row, state in zip(rows, states, strict=True)]
+        self._check_taken(len(numbers[0]))
+        return numbers
 
     def _check_taken(self, size: int) -> None:
         """Refuse what `lerobot-rollout` would not: of too many numbers it takes the first of any meaning."""
@@ -150,37 +218,28 @@ class PolicyCompletionStep(PolicyActionStep):
 
     completion: dict[str, Any]
     """A `Completion`, as JSON."""
-    _robots: list[CompletedRobot] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Read the settings."""
         super().__post_init__()
         self._by = decoded(self.completion, Completion, f"step {COMPLETE}")
+        self._robots: list[CompletedRobot] = []
 
-    def __call__(self, transition: EnvTransition) -> EnvTransition:
-        """Return the action."""
-        if self.view is not None and self.view.raw.keys().isdisjoint(AROUND):
-            return super().__call__(transition)
-        rows, states = self._rows(transition)
-        around = [self._around(key, len(rows)) for key in AROUND]
+    def _acted(self, rows: FloatArray, states: FloatArray, raw: Mapping[str, Any]) -> list[FloatArray]:
+        if raw.keys().isdisjoint(AROUND):
+            return super()._acted(rows, states, raw)
+        for key in AROUND:
+            if not isinstance(values := raw.get(key), torch.Tensor) or len(values) != len(rows):
+                words = f"expected {key} of {len(rows)} robots, as --env.type=handrail shows it"
+                raise self._error(f"{words}; got {_shape(values)}")
+        around = [raw[key].detach().cpu().numpy().astype(np.float64) for key in AROUND]
         self._robots += [CompletedRobot(self.seen, self._by) for _ in rows[len(self._robots) :]]
         parts = zip(self._robots, rows, states, *around, strict=False)
-        return _acting(transition, [robot.velocities(*numbers) for robot, *numbers in parts])
-
-    def get_config(self) -> dict[str, Any]:
-        """Return what makes this step again."""
-        return {"interface": self.interface, "completion": self.completion}
-
-    def _around(self, key: str, count: int) -> FloatArray:
-        values = self.view.raw.get(key) if self.view else None
-        if not isinstance(values, torch.Tensor) or len(values) != count:
-            words = f"{key} of {count} robots, as --env.type=handrail shows it"
-            raise self._error(f"expected {words}; got {_shape(values)}")
-        return values.detach().cpu().numpy().astype(np.float64)
+        return [robot.velocities(*numbers) for robot, *numbers in parts]
 
 
 def with_steps(
-    before: Any, after: Any, interface: PolicyInterface | None, completion: Completion | None = None
+    before: Any, after: Any, interface: PolicyInterface | None, by: Completion | None = None
 ) -> tuple[Any, Any]:
     """Return a policy's processors with the steps of its interface, so that anybody can run the policy.
 
@@ -188,7 +247,7 @@ def with_steps(
         before: LeRobot's preprocessor.
         after: LeRobot's postprocessor.
         interface: what the policy reads and writes; None if that is what was recorded.
-        completion: what completes its intents, if it writes any and that can be found again.
+        by: what completes its intents, if all its names are found again without importing what a file says.
     """
     if interface is None:
         return before, after
@@ -197,8 +256,8 @@ def with_steps(
     normalisers = [i for i, step in enumerate(steps) if isinstance(step, NormalizerProcessorStep)]
     steps.insert(normalisers[0] if normalisers else len(steps), view)
     act = PolicyActionStep(described)
-    if completion is not None and completion.is_installed and interface.is_partial:
-        act = PolicyCompletionStep(described, asdict(completion))
+    if interface.is_partial and by and by.robot in ROBOTS and by.task in TASKS and by.mode in MODES:
+        act = PolicyCompletionStep(described, asdict(by))
     return replace(before, steps=steps), replace(after, steps=[*after.steps, act])
 
 
@@ -207,25 +266,13 @@ def without_steps(pipeline: Any) -> Any:
     return replace(pipeline, steps=[step for step in pipeline.steps if not isinstance(step, PolicyStep)])
 
 
-def interface_in(pipeline: Any) -> PolicyInterface | None:
-    """Return the interface that a processor's steps have; None if it has none of them."""
-    return next((step.seen for step in pipeline.steps if isinstance(step, PolicyStep)), None)
-
-
-def _acting(transition: EnvTransition, numbers: list[FloatArray]) -> EnvTransition:
-    """Return a transition with another action, float64, of a batch or of one."""
-    changed: Any = transition.copy()
-    shape = changed[TransitionKey.ACTION].shape[:-1]
-    changed[TransitionKey.ACTION] = torch.as_tensor(np.stack(numbers)).reshape(*shape, len(numbers[0]))
-    return changed
-
-
 def _numbers(observation: Mapping[str, Any], key: str, size: int) -> FloatArray:
     """Return the numbers under a key, (B, size)."""
     values = observation.get(key)
     if not isinstance(values, torch.Tensor) or _size(values) != size:
-        words = f"expected {key} with {size} numbers, as recorded"
-        raise HandrailError(f"step {VIEW}: {words}; got {_shape(values)}")
+        raise HandrailError(
+            f"step {VIEW}: expected {key} with {size} numbers, as recorded; got {_shape(values)}"
+        )
     return values.detach().cpu().numpy().reshape(-1, size)
 
 

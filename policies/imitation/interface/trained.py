@@ -17,8 +17,8 @@ from safetensors.torch import load_model
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
-from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
-from handrail.policies.imitation.interface.steps import interface_in, without_steps
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.steps import without_steps
 from handrail.policies.imitation.interface.trust import WEIGHTS, check_policy_folder, registered_policies
 
 
@@ -26,8 +26,6 @@ from handrail.policies.imitation.interface.trust import WEIGHTS, check_policy_fo
 class TrainedPolicy:
     """A policy that can drive."""
 
-    interface: PolicyInterface | None
-    """What it reads and writes; None if that is what was recorded."""
     meta: PolicyMeta | None
     """What it is; None of a policy of plain LeRobot."""
     policy: Any
@@ -89,13 +87,10 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
         raise HandrailError(f"policy {str(place)!r}: {message_of(error)}") from error
     check_numbers(policy, around, place)
-    stepped, said = interface_in(around[0]), meta.interface if meta else None
-    if stepped is not None and said not in (None, stepped):
-        raise HandrailError(f"policy {str(place)!r}: expected {NAME} and the steps to agree on the interface")
     before, after = map(without_steps, around)  # an operator sees and acts through the interface itself
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
-    return TrainedPolicy(said or stepped, meta, policy, before, after)
+    return TrainedPolicy(meta, policy, before, after)
 
 
 @contextmanager
@@ -132,21 +127,22 @@ def check_numbers(policy: torch.nn.Module, pipelines: tuple[Any, ...], place: Pa
     if wrong:
         raise HandrailError(f"policy {str(place)!r}: expected finite weights, got others in {wrong[0]}")
     for step in (step for pipeline in pipelines for step in pipeline.steps):
-        if type(step) in (NormalizerProcessorStep, UnnormalizerProcessorStep) and step.stats:
-            for key, feature in step.features.items():
-                mode = step.norm_map.get(feature.type, NormalizationMode.IDENTITY)
-                applies = type(step) is NormalizerProcessorStep or feature.type is FeatureType.ACTION
-                if applies and mode is not NormalizationMode.IDENTITY:
-                    _check_statistics(step.stats.get(key, {}), key, feature, place)
+        if type(step) not in (NormalizerProcessorStep, UnnormalizerProcessorStep) or not step.stats:
+            continue
+        for key, feature in step.features.items():
+            mode = step.norm_map.get(feature.type, NormalizationMode.IDENTITY)
+            applies = type(step) is NormalizerProcessorStep or feature.type is FeatureType.ACTION
+            if applies and mode is not NormalizationMode.IDENTITY:
+                _check_statistics(step.stats.get(key, {}), key, feature, place)
 
 
 def _check_statistics(stats: Mapping[str, Any], key: str, feature: Any, place: Path) -> None:
+    shape = None if feature.type is FeatureType.VISUAL else tuple(feature.shape)
     trouble = "" if stats else "got none"
-    shape = tuple(feature.shape)
     for name, values in ((name, torch.as_tensor(values)) for name, values in stats.items()):
         if not values.isfinite().all():
             trouble = f"got NaN or infinity in {name}"
-        elif name != "count" and feature.type is not FeatureType.VISUAL and tuple(values.shape) != shape:
+        elif name != "count" and shape not in (None, tuple(values.shape)):
             trouble = f"of shape {shape}, got {tuple(values.shape)} in {name}"
     if trouble:
         raise HandrailError(f"policy {str(place)!r}: expected finite statistics of {key}, {trouble}")

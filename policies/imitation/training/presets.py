@@ -4,37 +4,20 @@ import json
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.datasets.storage.strict_json import parse_json
 from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
-from handrail.policies.imitation.interface.checkpoint import PolicyMeta
+from handrail.policies.imitation.interface.checkpoint import PolicyMeta, TrainingSizes
 from handrail.policies.imitation.interface.trust import registered_policies
 
 if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
 
 
-@dataclass(frozen=True)
-class Preset:
-    """Sizes of a policy and of its training."""
-
-    options: Mapping[str, Any] = field(default_factory=dict)
-    """Of the policy, as LeRobot calls them."""
-    lr: float = 1e-4
-    """Highest learning rate."""
-    cosine: bool = False
-    """Whether the learning rate falls along a cosine; else as the policy has it."""
-    steps: int = 100_000
-    """Updates."""
-    batch_size: int = 64
-    """Samples an update."""
-
-
 _REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
-_OLDER = {"base_pose": False, "scene": True}  # of a training before that could be said
 _ENSEMBLE = "temporal_ensemble_coeff"
 ACT_CPU: dict[str, Any] = {
     "chunk_size": 20,
@@ -51,19 +34,19 @@ _DIFFUSION: dict[str, Any] = {"noise_scheduler_type": "DDIM", "num_inference_ste
 _DIFFUSION_CPU = _DIFFUSION | {"horizon": 16, "n_action_steps": 8, "down_dims": [64, 128, 256]}
 _DIFFUSION_GPU = _DIFFUSION | {"horizon": 32, "n_action_steps": 16, "drop_n_last_frames": 15}
 _PRESETS = {
-    ("act", "cpu"): Preset(ACT_CPU, lr=5e-4, cosine=True, steps=10_000, batch_size=32),
-    ("act", "gpu"): Preset({"chunk_size": 50, "n_action_steps": 25}, lr=5e-5, cosine=True),
-    ("diffusion", "cpu"): Preset(_DIFFUSION_CPU, lr=3e-4, steps=10_000),
-    ("diffusion", "gpu"): Preset(_DIFFUSION_GPU, lr=1e-4),
+    ("act", "cpu"): TrainingSizes(ACT_CPU, lr=5e-4, cosine=True, steps=10_000, batch_size=32),
+    ("act", "gpu"): TrainingSizes({"chunk_size": 50, "n_action_steps": 25}, lr=5e-5, cosine=True),
+    ("diffusion", "cpu"): TrainingSizes(_DIFFUSION_CPU, lr=3e-4, steps=10_000),
+    ("diffusion", "gpu"): TrainingSizes(_DIFFUSION_GPU, lr=1e-4),
 }
 
 
-def resolved(config: TrainConfig) -> Preset:
+def resolved(config: TrainConfig) -> TrainingSizes:
     """Return what a training really uses: the preset, and over it what the config says.
 
     A policy without a preset is trained as LeRobot has it.
     """
-    preset = _PRESETS.get((config.policy, config.preset), Preset(lr=0.0))
+    preset = _PRESETS.get((config.policy, config.preset), TrainingSizes(lr=0.0))
     options, given = dict(preset.options), {key: _value(text) for key, text in config.options().items()}
     if "n_action_steps" in given:
         options.pop(_ENSEMBLE, None)  # averaging is for a look at every step
@@ -156,19 +139,19 @@ def check_policy(config: TrainConfig) -> None:
 
 def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
     """Check that settings are those of a checkpoint, and its sizes still those of the preset."""
-    now, then = as_json(config), _OLDER | dict(began.training)
-    for entry in fields(config):
-        if entry.name not in FREE_ON_RESUME and entry.name in then:
-            _check_same(f"--{entry.name}", now[entry.name], then[entry.name])
-    sizes = as_json(resolved(config))
-    least = began.sizes.get("steps", began.steps)
-    if sizes["steps"] < least:
-        raise HandrailError(f"--resume with --steps {sizes['steps']}: expected {least} or more, as it began")
-    for name in ("lr", "cosine", "batch_size"):
-        _check_same(f"the preset's {name}", sizes[name], began.sizes.get(name, sizes[name]))
-    options = began.sizes.get("options", sizes["options"])
-    for name in sorted(options.keys() | sizes["options"].keys()):
-        _check_same(f"the policy's {name}", sizes["options"].get(name), options.get(name))
+    sizes, least = resolved(config), began.sizes.steps
+    if sizes.steps < least:
+        raise HandrailError(f"--resume with --steps {sizes.steps}: expected {least} or more, as it began")
+    now = {f"--{name}": value for name, value in as_json(config).items() if name not in FREE_ON_RESUME}
+    then = {f"--{name}": value for name, value in began.training.items()}
+    for each, found in ((sizes, now), (began.sizes, then)):
+        found |= {f"the preset's {name}": getattr(each, name) for name in ("lr", "cosine", "batch_size")}
+        found |= {f"the policy's {name}": value for name, value in sorted(as_json(each)["options"].items())}
+    options = [name for name in then if name.startswith("the policy's ")]
+    for name in dict.fromkeys((*now, *options)):
+        if now.get(name) != then.get(name):
+            words = f"expected {then.get(name)} as the training began"
+            raise HandrailError(f"--resume with {name} {now.get(name)}: {words}")
 
 
 def as_json(settings: Any) -> Mapping[str, Any]:
@@ -181,8 +164,3 @@ def _value(text: str) -> Any:
         return parse_json(text.encode())
     except ValueError:
         return None if text in ("None", "none") else {"True": True, "False": False}.get(text, text)
-
-
-def _check_same(what: str, now: Any, then: Any) -> None:
-    if now != then:
-        raise HandrailError(f"--resume with {what} {now}: expected {then} as the training began")

@@ -1,21 +1,32 @@
-"""The loop of a training: LeRobot's update, over our data in LeRobot's order, into our checkpoints."""
+"""A training: LeRobot's parts and update, over our data in LeRobot's order, into our checkpoints."""
 
 import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import torch
+from accelerate import Accelerator
 from accelerate.data_loader import BatchSamplerShard
-from accelerate.utils import send_to_device
-from lerobot.common.train_utils import get_step_checkpoint_dir, save_checkpoint, should_save_checkpoint
+from accelerate.utils import DistributedDataParallelKwargs, DistributedType, send_to_device
+from lerobot.common.train_utils import (
+    get_step_checkpoint_dir,
+    load_training_state,
+    save_checkpoint,
+    should_save_checkpoint,
+)
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.datasets.sampler import EpisodeAwareSampler, compute_sampler_state
+from lerobot.optim.factory import make_optimizer_and_scheduler
+from lerobot.policies.factory import make_policy, make_pre_post_processors
 from lerobot.scripts.lerobot_train import update_policy
 from lerobot.utils.logging_utils import AverageMeter, MetricsTracker
+from lerobot.utils.random_utils import set_seed
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from torch.optim.lr_scheduler import LambdaLR
 from torch.utils.data import BatchSampler
 
 from handrail.controllers.errors import HandrailError
@@ -23,114 +34,168 @@ from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.policies.imitation.interface.checkpoint import MODEL, PolicyMeta, point_to, write_meta
-from handrail.policies.imitation.interface.completion import Completion
-from handrail.policies.imitation.interface.steps import with_steps
+from handrail.policies.imitation.interface.steps import Completion, with_steps, without_steps
+from handrail.policies.imitation.interface.trained import check_numbers, load_weights
 from handrail.policies.imitation.training.curve import Curve, read_sums, write_sums
-from handrail.policies.imitation.training.learner import Learner, build_learner
 from handrail.policies.imitation.training.memory import MemoryDataset
 from handrail.policies.imitation.training.plateau import Plateau
 
-_OVER_PROCESSES = {
-    **{"loss": "mean", "grad_norm": "none", "lr": "none"},
-    **{"update_s": "max", "dataloading_s": "max", "gpu_mem_gb": "max"},
-}
+_WHOLE_MODEL = (DistributedType.NO, DistributedType.MULTI_CPU, DistributedType.MULTI_GPU)  # in every process
+_PRECISIONS = {"float32": "no", "bfloat16": "bf16", "float16": "fp16"}  # accelerate's names
+_FRAMES = 2048  # measured at most, spread evenly: it takes as long as some twenty updates
+_SEED = 0  # of what a policy draws to compute its loss: the same for every measurement
+_OVER_PROCESSES = {"loss": "mean", "grad_norm": "none", "lr": "none"}
+_OVER_PROCESSES |= dict.fromkeys(("update_s", "dataloading_s", "gpu_mem_gb"), "max")
 
 
-@dataclass(frozen=True)
 class TrainingRun:
-    """One training, from its beginning or from a checkpoint."""
+    """One training, made anew, or as it was when a checkpoint was written, what is random included.
 
-    settings: TrainPipelineConfig
-    """LeRobot's."""
-    learnt: MemoryDataset
-    held_out: MemoryDataset | None
-    """Episodes on which the loss is measured."""
-    checkpoint: Path | None
-    """The checkpoint to go on from; None to begin."""
-    meta: Callable[[int], PolicyMeta]
-    """Describes the policy after so many updates."""
-    losses: dict[int, float]
-    """On the held-out episodes, by update: as they are measured."""
-    eval_steps: int
-    """Updates between two measurements."""
-    plateau: Plateau | None = None
-    """Ends the training where that loss is flat; None makes all updates."""
-    quiet: bool = False
-    """Whether to show no progress."""
+    Args:
+        settings: LeRobot's.
+        learnt: what is learnt from.
+        checkpoint: to go on from; None to begin.
+        plateau: ends the training where the loss on held-out episodes is flat, and says how the learning rate
+            goes; None makes all updates, by the settings' schedule.
+    """
 
-    def train(self) -> None:
+    def __init__(
+        self,
+        settings: TrainPipelineConfig,
+        learnt: MemoryDataset,
+        checkpoint: Path | None,
+        plateau: Plateau | None,
+    ) -> None:
+        described = settings.policy
+        assert described is not None
+        assert settings.output_dir is not None
+        self._settings, self._learnt, self._plateau = settings, learnt, plateau
+        self._folder, self._sums = settings.output_dir, read_sums(checkpoint)
+        self._accelerator = _accelerator(described)
+        set_seed(settings.seed, self._accelerator)  # pyright: ignore[reportArgumentType]
+        place = None if checkpoint is None else checkpoint / MODEL
+        if place is not None:
+            described.pretrained_path = place
+        stats: Any = learnt.meta.stats
+        policy: Any = make_policy(described, learnt.meta)  # pyright: ignore[reportArgumentType]
+        if place is None:
+            around = make_pre_post_processors(described, dataset_stats=stats)
+        else:
+            device = {"device_processor": {"device": self._accelerator.device.type}}
+            around = make_pre_post_processors(described, str(place), preprocessor_overrides=device)
+            load_weights(policy, place)  # LeRobot leaves out what does not fit
+            check_numbers(policy, around, place)
+        optimizer, schedule = make_optimizer_and_scheduler(settings, policy)
+        if plateau is not None:
+            schedule = LambdaLR(optimizer, plateau.rate)
+        if isinstance(optimizer, torch.optim.Adam):
+            for group in optimizer.param_groups:  # all weights in one call
+                group["fused"], group["foreach"] = True, False
+        self._step: int = 0
+        if checkpoint is not None:
+            self._step, optimizer, schedule = load_training_state(checkpoint, optimizer, schedule)
+        parts: Any = self._accelerator.prepare(policy, optimizer, schedule)
+        self._policy, self._optimizer, self._schedule = parts
+        self._before, self._after = map(without_steps, around)  # the data in memory are seen so already
+
+    def train(
+        self,
+        meta: Callable[[int], PolicyMeta],
+        held_out: MemoryDataset | None,
+        losses: dict[int, float],
+        every: int,
+        quiet: bool = False,
+    ) -> None:
         """Train to the end; one of the processes writes checkpoints and the curve, and shows the progress.
+
+        Args:
+            meta: describes the policy after so many updates.
+            held_out: episodes on which the loss is measured.
+            losses: on these, by update: as they are measured.
+            every: updates between two measurements.
+            quiet: show no progress.
 
         Raises:
             KeyboardInterrupt: it was interrupted; the update is finished, and its checkpoint written.
         """
-        learner = build_learner(self.settings, self.learnt.meta, self.checkpoint, self.plateau)
-        main, folder = learner.accelerator.is_main_process, self.settings.output_dir
-        curve = Curve(folder, learner.step) if main and folder else None
+        settings, main, means = self._settings, self._accelerator.is_main_process, self._means()
+        assert settings.optimizer is not None
+        around = settings.optimizer.grad_clip_norm, self._accelerator, self._schedule
+        curve = Curve(self._folder, self._step) if main else None
         columns = TextColumn("training"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        loss, shown = TextColumn("{task.description}"), main and not self.quiet
+        loss, shown = TextColumn("{task.description}"), main and not quiet
         with (
             Progress(*columns, loss, console=Terminal(stderr=True), disable=not shown) as progress,
             Interrupts() as interrupts,
             interrupts.deferred(),
         ):
-            self._loop(learner, curve, progress, interrupts)
-        learner.accelerator.end_training()
-
-    def _loop(
-        self, learner: Learner, curve: Curve | None, progress: Progress, interrupts: Interrupts
-    ) -> None:
-        settings, means = self.settings, self._means(learner)
-        assert settings.optimizer is not None
-        around = settings.optimizer.grad_clip_norm, learner.accelerator, learner.schedule
-        batches = self._batches(learner)
-        bar = progress.add_task("", total=self._end, completed=learner.step)
-        step, ends = learner.step, False
-        while step < self._end and not ends:
-            step += 1
-            began = time.perf_counter()
-            batch = learner.before(next(batches))
-            means.dataloading_s = time.perf_counter() - began
-            update_policy(means, learner.policy, batch, learner.optimizer, *around)
-            means.step()
-            progress.advance(bar)
-            if step % settings.log_freq == 0:
-                means.reduce_across_ranks()
-                if curve is not None:
-                    curve.add(row := means.to_dict() | {"step": step})
-                    progress.update(bar, description=f"loss {row['loss']:.4f}")
-                means.reset_averages()
-            if self.held_out and (step % self.eval_steps == 0 or step == self._end):
-                loss = learner.loss_on(self.held_out, settings.batch_size)
-                if not math.isfinite(loss):
-                    words = f"got {loss} after {step} updates"
-                    raise HandrailError(f"training: expected a finite loss on held-out episodes, {words}")
-                self.losses[step] = loss
-                progress.update(bar, total=self._end)
-            ends = interrupts.asked
-            if ends or should_save_checkpoint(step, settings.save_freq, self._end):
-                if learner.accelerator.is_main_process:
-                    self._save(learner, step, means)
-                if not ends:  # of other processes' interrupts this one does not know
-                    learner.accelerator.wait_for_everyone()
+            bar = progress.add_task("", total=self._end, completed=self._step)
+            batches, ends = self._batches(), False
+            while self._step < self._end and not ends:
+                self._step += 1
+                began = time.perf_counter()
+                batch = self._before(next(batches))
+                means.dataloading_s = time.perf_counter() - began
+                update_policy(means, self._policy, batch, self._optimizer, *around)
+                means.step()
+                progress.advance(bar)
+                if self._step % settings.log_freq == 0:
+                    means.reduce_across_ranks()
+                    if curve is not None:
+                        curve.add(row := means.to_dict() | {"step": self._step})
+                        progress.update(bar, description=f"loss {row['loss']:.4f}")
+                    means.reset_averages()
+                if held_out and (self._step % every == 0 or self._step == self._end):
+                    losses[self._step] = self._loss_on(held_out)
+                    progress.update(bar, total=self._end)
+                ends = interrupts.asked
+                if ends or should_save_checkpoint(self._step, settings.save_freq, self._end):
+                    if main:
+                        self._save(meta(self._step), means)
+                    if not ends:  # of other processes' interrupts this one does not know
+                        self._accelerator.wait_for_everyone()
+        self._accelerator.end_training()
 
     @property
     def _end(self) -> int:
         """The last update, as far as is known now."""
-        return self.plateau.end if self.plateau else self.settings.steps
+        return self._plateau.end if self._plateau else self._settings.steps
 
-    def _means(self, learner: Learner) -> MetricsTracker:
+    def _loss_on(self, held_out: MemoryDataset) -> float:
+        """Return the loss on episodes, the same in every process; what is random goes on as before."""
+        policy, count = self._accelerator.unwrap_model(self._policy), len(held_out)
+        frames = np.unique(np.linspace(0, count - 1, min(count, _FRAMES)).round().astype(int)).tolist()
+        total, size, device = 0.0, self._settings.batch_size, self._accelerator.device
+        policy.eval()
+        with torch.random.fork_rng(), torch.no_grad(), self._accelerator.autocast():
+            torch.manual_seed(_SEED)
+            for start in range(0, len(frames), size):
+                indices = frames[start : start + size]
+                batch = self._before(send_to_device(held_out.batch(indices), device))
+                total += policy.forward(batch)[0].item() * len(indices)
+        policy.train()
+        mean: Any = torch.tensor(total / len(frames), device=device)
+        reduced: Any = self._accelerator.reduce(mean, reduction="mean")
+        if not math.isfinite(loss := float(reduced)):
+            words = f"got {loss} after {self._step} updates"
+            raise HandrailError(f"training: expected a finite loss on held-out episodes, {words}")
+        return loss
+
+    def _means(self) -> MetricsTracker:
         meters = {name: AverageMeter(name, reduction=how) for name, how in _OVER_PROCESSES.items()}
-        for name, (total, count) in read_sums(self.checkpoint).items():
+        for name, (total, count) in self._sums.items():
             meters[name].sum, meters[name].count = total, count
-        sizes = self.settings.batch_size, len(self.learnt), len(self.learnt.meta.lengths)
-        accelerator: Any = learner.accelerator
-        return MetricsTracker(*sizes, meters, learner.step, accelerator)
+        sizes = self._settings.batch_size, len(self._learnt), len(self._learnt.meta.lengths)
+        accelerator: Any = self._accelerator
+        return MetricsTracker(*sizes, meters, self._step, accelerator)
 
-    def _batches(self, learner: Learner) -> Iterator[Any]:
+    def _batches(self) -> Iterator[Any]:
         """Yield batches for ever, from where a training that was cut off would have gone on, to the bit."""
-        settings, episodes, accelerator = self.settings, self.learnt.meta.episodes, learner.accelerator
-        processes = accelerator.num_processes
+        settings, episodes, processes = (
+            self._settings,
+            self._learnt.meta.episodes,
+            self._accelerator.num_processes,
+        )
         sampler = EpisodeAwareSampler(
             episodes["dataset_from_index"],
             episodes["dataset_to_index"],
@@ -138,27 +203,44 @@ class TrainingRun:
             shuffle=True,
             seed=settings.seed or 0,
         )
-        state = compute_sampler_state(learner.step, len(sampler), settings.batch_size, processes)
+        state = compute_sampler_state(self._step, len(sampler), settings.batch_size, processes)
         sampler.load_state_dict(state)
         order: Any = BatchSampler(sampler, settings.batch_size, drop_last=False)
         if processes > 1:
-            order = BatchSamplerShard(order, processes, accelerator.process_index)
+            order = BatchSamplerShard(order, processes, self._accelerator.process_index)
         while True:
             for indices in order:
-                yield send_to_device(self.learnt.batch(indices), accelerator.device)
+                yield send_to_device(self._learnt.batch(indices), self._accelerator.device)
 
-    def _save(self, learner: Learner, step: int, means: MetricsTracker) -> None:
-        assert self.settings.output_dir is not None
-        folder = get_step_checkpoint_dir(self.settings.output_dir, self.settings.steps, step)
+    def _save(self, meta: PolicyMeta, means: MetricsTracker) -> None:
+        folder = get_step_checkpoint_dir(self._folder, self._settings.steps, meta.steps)
         draft = folder.with_name(f".{folder.name}")
         shutil.rmtree(draft, ignore_errors=True)
-        meta, accelerator = self.meta(step), learner.accelerator
         completion = Completion(meta.robot, meta.environment, meta.mode, meta.fps)
-        around = with_steps(learner.before, learner.after, meta.interface, completion)
-        parts = (accelerator.unwrap_model(learner.policy), learner.optimizer, learner.schedule, *around)
-        sizes = accelerator.num_processes, self.settings.batch_size
-        save_checkpoint(draft, step, self.settings, *parts, *sizes)
+        around = with_steps(self._before, self._after, meta.interface, completion)
+        policy, sizes = self._accelerator.unwrap_model(self._policy), self._settings.batch_size
+        parts = (policy, self._optimizer, self._schedule, *around)
+        save_checkpoint(draft, meta.steps, self._settings, *parts, self._accelerator.num_processes, sizes)
         write_sums(draft, means.metrics)
         write_meta(draft / MODEL, meta)
         publish_folder(draft, folder)
         point_to(folder)
+
+
+def _accelerator(policy: Any) -> Accelerator:
+    """Return what spreads a training over the processes it was started in, at the policy's precision."""
+    torch.backends.cudnn.benchmark = True
+    torch.backends.cuda.matmul.allow_tf32 = True
+    dtype = getattr(policy, "dtype", None)
+    if not hasattr(policy, "dtype") and getattr(policy, "use_amp", False):
+        dtype = str(torch.get_autocast_dtype(torch.device(policy.device).type)).removeprefix("torch.")
+    accelerator = Accelerator(
+        step_scheduler_with_optimizer=False,
+        mixed_precision=_PRECISIONS.get(dtype or ""),
+        kwargs_handlers=[DistributedDataParallelKwargs(find_unused_parameters=True)],
+        cpu=policy.device == "cpu",
+    )
+    kind = accelerator.distributed_type
+    if kind not in _WHOLE_MODEL:
+        raise HandrailError(f"accelerate launch: expected one process or --multi_gpu, got {kind.value}")
+    return accelerator

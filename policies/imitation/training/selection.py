@@ -9,6 +9,7 @@ import numpy as np
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.interface.checkpoint import PolicyMeta
 
 Row = Mapping[str, Any]
 _MINUTE = 60.0
@@ -56,22 +57,14 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
     return Selection(tuple(sorted(kept, key=lambda row: row["episode_index"])), taken, frames / fps)
 
 
-def select_again(rows: Sequence[Row], numbers: Sequence[int], trained_on: Mapping[str, float]) -> Selection:
-    """Return the episodes that a training began with, whatever the dataset has gained since.
-
-    Args:
-        rows: lines of metadata of the dataset as it is now.
-        numbers: of the episodes.
-        trained_on: `attempts` and `operator_time` [s], as they were when they were chosen.
-    """
+def select_again(rows: Sequence[Row], began: PolicyMeta) -> Selection:
+    """Return the episodes that a training began with, whatever the dataset has gained since."""
     there = {row["episode_index"]: row for row in rows}
-    missing = [number for number in numbers if number not in there]
-    if missing:
-        raise HandrailError(
-            f"--resume: expected the episodes of before; the dataset has no episode {missing[0]}"
-        )
-    kept = tuple(there[number] for number in numbers)
-    return Selection(kept, int(trained_on["attempts"]), trained_on["operator_time"])
+    if missing := [number for number in began.episodes if number not in there]:
+        words = f"expected the episodes of before; the dataset has no episode {missing[0]}"
+        raise HandrailError(f"--resume: {words}")
+    kept, how = tuple(there[number] for number in began.episodes), began.trained_on
+    return Selection(kept, int(how.get("attempts", 0)), how.get("operator_time", 0.0))
 
 
 def hold_out(rows: Sequence[Row], config: TrainConfig) -> tuple[list[Row], list[Row]]:

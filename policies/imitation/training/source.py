@@ -87,16 +87,6 @@ class TrainingSource:
         }
         return numbers | ({"held_out": len(held_out)} if held_out else {})
 
-    def check_same(self, began: PolicyMeta) -> None:
-        """Check that this is what a checkpoint learnt from.
-
-        A checkpoint of an earlier version says nothing of pictures, or only how many episodes and how long.
-        """
-        same = self.digest.startswith(began.data) if began.data else self.trained_on == began.trained_on
-        if not same:
-            count = began.trained_on.get("episodes", 0)
-            raise HandrailError(f"--resume: expected the {count:g} episodes that it began with, got others")
-
     @property
     def split(self) -> tuple[list[Row], list[Row]]:
         """The episodes to learn from, and those that are held out."""
@@ -144,10 +134,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Trainin
     check_whole(root, config.verify)
     info = read_info(root)
     rows = with_success(info, read_episodes(root))
-    if began is not None and began.episodes:
-        selection = select_again(rows, began.episodes, began.trained_on)
-    else:
-        selection = select(rows, info.fps, config)
+    selection = select_again(rows, began) if began else select(rows, info.fps, config)
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
     else:
@@ -160,7 +147,11 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Trainin
         features.pop(ENVIRONMENT, None)
         columns.pop(ENVIRONMENT, None)
     columns |= _counters(selection.rows, info.fps)
-    return TrainingSource(config, info, selection, interface, features, columns)
+    source = TrainingSource(config, info, selection, interface, features, columns)
+    if began is not None and source.digest != began.data:
+        count = began.trained_on.get("episodes", 0)
+        raise HandrailError(f"--resume: expected the {count:g} episodes that it began with, got others")
+    return source
 
 
 def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -227,16 +218,14 @@ def _recorded(info: DatasetInfo, selection: Selection, config: TrainConfig) -> t
             columns[key] = values.astype(np.float32)
     if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or cameras):
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
-    numbers = [key for key in features if key.startswith("observation")]
+    numbers, needed = [key for key in features if key.startswith("observation")], ""
     if STATE not in numbers and config.policy in _READ_STATE:
-        beside = " beside pictures (--images)" if cameras else ""
+        needed = f"a column {STATE!r}"
+    elif not config.images and (not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)):
+        needed = f"{ENVIRONMENT!r}, or pictures and --images,"
+    if needed:
         found = ", ".join((*numbers, *cameras)) or "no observation"
-        words = f"expected a column {STATE!r}, which policy {config.policy} needs{beside}"
-        raise HandrailError(f"{where}: {words}; got {found}")
-    blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
-    if blind and cameras and not config.images:
-        words = f"expected {ENVIRONMENT!r} or --images for policy {config.policy}"
-        raise HandrailError(f"{where}: {words}; there are pictures ({', '.join(cameras)}): say --images")
+        raise HandrailError(f"{where}: expected {needed} for policy {config.policy}; got {found}")
     return features, columns
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from lerobot.configs.default import DatasetConfig
 from lerobot.configs.train import TrainPipelineConfig
@@ -21,7 +21,6 @@ from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
     MODEL,
     PolicyMeta,
-    TrainingSizes,
     last_checkpoint,
     origin_of,
     read_meta,
@@ -31,7 +30,6 @@ from handrail.policies.imitation.interface.trust import check_links, check_polic
 from handrail.policies.imitation.training.curve import NAME as CURVE
 from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.imitation.training.presets import (
-    as_json,
     check_settings,
     in_one_line,
     policy_config,
@@ -57,31 +55,22 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     began = None if checkpoint is None else _checked(config, checkpoint)
     source, steps = read_source(config, began), resolved(config).steps
     losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
-    if began is not None:
-        source.check_same(began)
     plateau, warmup = None, min(_WARMUP, steps // 10)
     if config.patience:
         plateau = Plateau(losses, config.patience, config.improvement, steps, warmup)
-    if checkpoint is not None and int(checkpoint.name) >= (plateau.end if plateau else steps):
-        return checkpoint / MODEL
-    with threads(config.threads), _quiet(config), in_one_line(config):
-        settings = _settings(config, steps, warmup)
-        assert settings.policy is not None
-        parts = [source.only(rows).dataset(settings.policy) for rows in source.split if rows]
-        TrainingRun(
-            settings,
-            parts[0],
-            parts[1] if len(parts) > 1 else None,
-            checkpoint,
-            lambda step: _meta(source, step, losses),
-            losses,
-            config.eval_steps,
-            plateau,
-            quiet,
-        ).train()
-    last = last_checkpoint(config.folder)
-    assert last is not None
-    return last / MODEL
+    if checkpoint is None or int(checkpoint.name) < (plateau.end if plateau else steps):
+        with threads(config.threads), _quiet(config), in_one_line(config):
+            settings = _settings(config, steps, warmup)
+            assert settings.policy is not None
+            learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
+            training = TrainingRun(settings, learnt, checkpoint, plateau)
+            held_out = out[0] if out else None
+            training.train(
+                lambda step: _meta(source, step, losses), held_out, losses, config.eval_steps, quiet
+            )
+        checkpoint = last_checkpoint(config.folder)
+    assert checkpoint is not None
+    return checkpoint / MODEL
 
 
 def _checked(config: TrainConfig, checkpoint: Path) -> PolicyMeta:
@@ -151,7 +140,7 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> Po
         steps=steps,
         training=asdict(config),
         versions=versions(*TRAINING),
-        sizes=cast(TrainingSizes, as_json(resolved(config))),
+        sizes=resolved(config),
         episodes=tuple(int(row["episode_index"]) for row in rows),
         data=source.digest,
         time_limit=_time_limit(rows),

@@ -65,7 +65,7 @@ def test_a_training_on_pictures_goes_on_to_the_bit(tmp_path):
 
 
 def test_a_training_does_not_go_on_with_other_pictures(tmp_path, monkeypatch):
-    """The numbers are the same. A checkpoint of an earlier version says nothing of pictures, and goes on."""
+    """The numbers are the same."""
     root = canned(write_dataset, lengths=(5, 6), cameras=("wrist",))
     dark = {"observation.images.wrist": np.zeros((16, 16, 3), np.uint8)}
     with monkeypatch.context() as other:
@@ -73,12 +73,11 @@ def test_a_training_does_not_go_on_with_other_pictures(tmp_path, monkeypatch):
         other.setattr(training_helpers, "frame", lambda rng, cameras: drawn(rng, cameras) | dark)
         darker = write_dataset(tmp_path / "dark", lengths=(5, 6), cameras=("wrist",))
     config = tiny(root, tmp_path / "policy", SMALL, images=True)
-    source, moved = read_source(config), read_source(replace(config, dataset=StoredConfig(root=str(darker))))
+    source, moved = read_source(config), replace(config, dataset=StoredConfig(root=str(darker)))
     began = read_meta(train(config, quiet=True))
     assert began.data == source.digest
-    source.check_same(replace(began, data=began.data[:16]))
     with pytest.raises(HandrailError, match="got others"):
-        moved.check_same(began)
+        read_source(moved, began)
 
 
 def test_a_policy_is_told_what_to_do(tmp_path):

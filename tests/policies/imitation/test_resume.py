@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import json
 import os
 import shutil
 import signal
@@ -14,7 +13,7 @@ from lerobot.scripts.lerobot_train import update_policy
 from training_helpers import cut, refused, tiny, weights, write_dataset
 
 from handrail.collect.config import StoredConfig
-from handrail.policies.imitation.interface.checkpoint import NAME, last_checkpoint, read_meta, write_meta
+from handrail.policies.imitation.interface.checkpoint import read_meta
 from handrail.policies.imitation.training import presets, run
 from handrail.policies.imitation.training.curve import read_curve
 from handrail.policies.imitation.training.source import read_source
@@ -55,32 +54,6 @@ def test_a_training_does_not_go_on_with_other_data_steps_or_sizes(trained, tmp_p
     refused(dataclasses.replace(config, steps=5), "--steps 5: expected 6 or more")
     monkeypatch.setitem(presets.ACT_CPU, "dropout", 0.1)
     refused(config, r"dropout 0\.1: expected 0\.0")
-
-
-def test_a_training_goes_on_with_the_view_that_it_began_with(recorded, tmp_path):
-    """One of an earlier version does not say it: it did not see where the base is."""
-    config = tiny(recorded, tmp_path / "older", base_pose=False)
-    whole = train(config, quiet=True)
-    older = cut(config, tmp_path / "cut")
-    checkpoint = last_checkpoint(tmp_path / "cut")
-    assert checkpoint
-    path = checkpoint / "pretrained_model" / NAME
-    content = json.loads(path.read_text())
-    del content["interface"]["base_pose"], content["training"]["base_pose"]
-    path.write_text(json.dumps(content))
-    refused(dataclasses.replace(older, base_pose=True), "--base_pose True: expected False")
-    assert weights(train(older, quiet=True)) == weights(whole)
-
-
-def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, tmp_path):
-    config = tiny(recorded, tmp_path / "whole")
-    whole = train(config, quiet=True)
-    again = cut(config, tmp_path / "cut")
-    meta = read_meta(folder := again.folder / "checkpoints" / "000003" / "pretrained_model")
-    write_meta(folder, dataclasses.replace(meta, episodes=(), data="", sizes={}))
-    more = StoredConfig(root=str(canned(write_dataset, lengths=(9, 7, 8, 5))))
-    refused(dataclasses.replace(again, dataset=more), "expected the 3 episodes")
-    assert weights(train(again, quiet=True)) == weights(whole)
 
 
 def test_the_curve_has_a_row_every_fifty_updates_also_after_a_cut(recorded, tmp_path):

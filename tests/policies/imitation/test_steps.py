@@ -21,9 +21,9 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env
 from handrail.collect.world.observation import to_numbers
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.interface.completion import Completion
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import (
+    Completion,
     PolicyActionStep,
     PolicyCompletionStep,
     PolicyViewStep,
@@ -89,13 +89,13 @@ def test_plain_loading_acts_as_the_interface_does(checkpoint):
         batch = before({key: torch.from_numpy(values)[None] for key, values in raw.items()})
         with torch.inference_mode():
             theirs = after(policy.select_action(batch))[0].numpy()
-        acted.append(ours.act(*ours.interface.observe(state, environment)))
-        meant = ours.interface.decode(acted[-1], state)
+        acted.append(ours.act(*ours.meta.interface.observe(state, environment)))
+        meant = ours.meta.interface.decode(acted[-1], state)
         np.testing.assert_array_equal(theirs[:-1], meant.values[meant.mask])
         assert theirs[-1] == meant.gripper
     assert not np.array_equal(acted[0], acted[1])  # the next of the chunk
     ours.reset()
-    np.testing.assert_array_equal(ours.act(*ours.interface.observe(state, environment)), acted[0])
+    np.testing.assert_array_equal(ours.act(*ours.meta.interface.observe(state, environment)), acted[0])
 
 
 def test_a_mask_becomes_the_focus_and_what_is_no_number_stays_none():

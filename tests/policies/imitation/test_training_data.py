@@ -23,12 +23,16 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).
 PICTURES = "observation.images.top"
 STATE, ENVIRONMENT = "observation.state", "observation.environment_state"
 CASES = {
-    "no state": ((ENVIRONMENT, "action"), "act", "'observation.state', which policy act needs"),
-    "no state for diffusion": ((ENVIRONMENT, "action"), "diffusion", "which policy diffusion needs; got"),
-    "nothing but the action": (("action",), "act", "'observation.state', .* got no observation"),
-    "pictures only": ((PICTURES, "action"), "act", "needs beside pictures [(]--images[)]; got"),
-    "pictures for another": ((PICTURES, "action"), "tdmpc", "[(]observation.images.top[)]: say --images"),
-    "state and pictures": ((STATE, PICTURES, "action"), "act", "[(]observation.images.top[)]: say --images"),
+    "no state": ((ENVIRONMENT, "action"), "act", "a column 'observation.state' for policy act"),
+    "no state for diffusion": ((ENVIRONMENT, "action"), "diffusion", "for policy diffusion; got"),
+    "nothing but the action": (("action",), "act", "'observation.state' .* got no observation"),
+    "pictures only": ((PICTURES, "action"), "act", "for policy act; got observation.images.top"),
+    "pictures for another": ((PICTURES, "action"), "tdmpc", "or pictures and --images, for policy tdmpc"),
+    "state and pictures": (
+        (STATE, PICTURES, "action"),
+        "act",
+        "and --images, .*observation.images.top",
+    ),
     "no action": ((STATE, PICTURES), "act", "expected a column 'action', got observation.state"),
     "nothing but pictures": ((PICTURES,), "act", "expected a column 'action', got none"),
 }
