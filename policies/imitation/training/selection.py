@@ -60,6 +60,8 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
 def select_again(rows: Sequence[Row], began: PolicyMeta) -> Selection:
     """Return the episodes that a training began with, whatever the dataset has gained since."""
     there = {row["episode_index"]: row for row in rows}
+    if not began.episodes:
+        raise HandrailError("--resume: expected a checkpoint that says its episodes, got an older one")
     if missing := [number for number in began.episodes if number not in there]:
         words = f"expected the episodes of before; the dataset has no episode {missing[0]}"
         raise HandrailError(f"--resume: {words}")

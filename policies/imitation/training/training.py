@@ -64,10 +64,8 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
             assert settings.policy is not None
             learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
             training = TrainingRun(settings, learnt, checkpoint, plateau)
-            held_out = out[0] if out else None
-            training.train(
-                lambda step: _meta(source, step, losses), held_out, losses, config.eval_steps, quiet
-            )
+            measured = out[0] if out else None, losses, config.eval_steps
+            training.train(lambda step: _meta(source, step, losses), *measured, quiet)
         checkpoint = last_checkpoint(config.folder)
     assert checkpoint is not None
     return checkpoint / MODEL
