@@ -1,16 +1,188 @@
-"""What is evaluated: a checkpoint under a condition."""
+"""What is evaluated: a checkpoint, whose robot and task it, its dataset or flags say, under a condition."""
 
+import hashlib
 import itertools
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypedDict
 
+from handrail.collect.config import CAMERAS, MOST_MOVING, SessionConfig
+from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_mode, build_task
 from handrail.collect.session.perturbations import Perturbation
+from handrail.collect.world.observation import AgentObservation
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.evaluation.checkpoint import Checkpoint, read_checkpoint
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.regular_file import open_regular
+from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.typed import Count, check
+from handrail.datasets.reading.reader import read_episodes, read_info
+from handrail.datasets.storage.strict_json import load_json, read_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.interface.checkpoint import (
+    NAME,
+    PolicyMeta,
+    model_folder,
+    origin_of,
+    read_meta,
+)
+from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.trust import check_policy_folder
 
+_TRAINED = "train_config.json"  # of LeRobot's: how a policy was trained, not how it drives
+_IMAGES = "observation.images."
 _SAID = ("environment", "robot", "mode", "fps", "actions")
+
+
+class _Trained(TypedDict, total=False):
+    seed: Count | None
+    dataset: Mapping[str, Any] | None
+
+
+class _Shaped(TypedDict):
+    shape: tuple[Count, ...]
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A trained policy on the disk."""
+
+    folder: Path
+    meta: PolicyMeta
+    pictures: Mapping[str, tuple[int, int]]
+    """Height and width of what it sees, by camera [px]."""
+    movers: int
+    """Number of moving obstacles that it knows of."""
+    joined: bool
+    """Whether it reads robot and scene as one vector."""
+    digest: str
+    """Of all that decides how it drives; not of where and when it was trained."""
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Draw of the dataset and training seed."""
+        return self.meta.dataset_draw, self.meta.training_seed
+
+
+def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
+    """Return the checkpoint in a folder, or the last one of a training run's folder.
+
+    Args:
+        folder: of the checkpoint.
+        config: says what plain LeRobot's do not, their rate and perhaps their task.
+    """
+    place = model_folder(folder)
+    settings = check_policy_folder(place)
+    where = f"--policy {place}"
+    meta = read_meta(place) if (place / NAME).is_file() else _plain(place, settings, config)
+    if config.task and meta.environment in TASKS and meta.environment != config.task:
+        raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
+    TASKS.admit(meta.environment, (config.task,))  # before anything that a policy names is imported
+    MODES.admit(meta.mode, (config.mode,))
+    ROBOTS.admit(meta.robot, (config.robot,))
+    sizes, pictures = _features(settings, where)
+    if meta.interface is None:
+        robot = meta.robot if meta.robot in ROBOTS else config.robot
+        task = meta.environment if meta.environment in TASKS else config.task
+        if not (robot and task):
+            raise HandrailError(f"{where}: expected --robot and --task: neither it nor its dataset says them")
+        meta = replace(meta, environment=task, robot=robot)
+    if not TASKS.accepts(meta.environment):
+        raise HandrailError(f"{where}: expected a task of {', '.join(TASKS)}, got {meta.environment!r}")
+    movers, joined = _scene(sizes, where, meta)
+    return Checkpoint(place, meta, pictures, movers, joined, _digest(place))
+
+
+def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
+    """Return what is known of a policy of plain `lerobot-train`: from its training and its dataset."""
+    path, step = place / _TRAINED, place.parent.name
+    content = load_json(path, "settings of LeRobot") if path.is_file() else {}
+    training = check(content, _Trained, repr(str(path)))
+    root, task, robot = Path((training.get("dataset") or {}).get("root") or place), "", ""
+    with suppress(HandrailError, OSError):  # it need not be here
+        task, _, robot = origin_of(read_info(root), read_episodes(root))
+    return PolicyMeta(
+        interface=None,
+        environment=task,
+        mode=config.mode,
+        robot=robot,
+        fps=config.fps,
+        actions="intent" if config.mode else "recorded",
+        training_seed=training.get("seed") or 0,
+        dataset_draw=0,
+        trained_on={},
+        policy=settings["type"],
+        steps=int(step) if step.isdecimal() else 0,
+    )
+
+
+def _features(settings: Mapping[str, Any], where: str) -> tuple[dict[str, int], dict[str, tuple[int, int]]]:
+    """Return the sizes of what a policy reads and writes; of pictures height and width, by camera [px]."""
+    sizes, pictures = {}, {}
+    for which in ("input_features", "output_features"):
+        features = check(settings.get(which) or {}, dict[str, _Shaped], f"{where}: {which}")
+        for name, shape in ((name, feature["shape"]) for name, feature in features.items()):
+            camera = name.removeprefix(_IMAGES)
+            if len(shape) != (1 if camera == name else 3):
+                expected = "one dimension" if camera == name else "channels, height and width"
+                raise HandrailError(f"{where}: {name}: expected {expected}, got {shape}")
+            if camera == name:
+                sizes[name] = shape[0]
+            elif camera in CAMERAS:
+                pictures[camera] = shape[1:]
+            else:
+                words = f"expected one of {', '.join(CAMERAS)}"
+                raise HandrailError(f"{where}: reads the camera {camera!r}: {words}")
+    return sizes, pictures
+
+
+def _scene(given: Mapping[str, int], where: str, meta: PolicyMeta) -> tuple[int, bool]:
+    """Return of how many moving obstacles a policy knows, and if it reads robot and scene as one vector."""
+    if meta.interface is not None:
+        names = meta.interface.environment_names
+        return len({name.split(".")[0] for name in names if name.startswith("mover_")}), False
+    state, action = len(AgentObservation(load_model(meta.robot)).names), len(mode_action(meta).names)
+    known: list[dict[str, int]] = []
+    for movers in range(MOST_MOVING + 1 if TASKS.find(meta.environment).movers else 1):
+        task = build_task(SessionConfig(task=meta.environment, moving_obstacles=movers))
+        scene = len(task.state_names)
+        known.append({STATE: state, ENVIRONMENT: scene, ACTION: action})
+        if meta.intent_mode:
+            known.append({STATE: state + scene, ACTION: action})
+        for each in known[-2:]:
+            if ACTION in given and given.items() <= each.items():
+                return movers, ENVIRONMENT not in each
+    expected = f"the features of {meta.robot} in {meta.environment}, as {known[0]}"
+    raise HandrailError(f"{where}: expected {expected}; got {given}")
+
+
+def mode_action(meta: PolicyMeta) -> ModeAction:
+    """Return what a policy writes that writes what was recorded."""
+    model = load_model(meta.robot)
+    mode = build_mode(SessionConfig(task=meta.environment, mode=meta.intent_mode or "direct"), model)
+    return ModeAction(mode, Channels.of(model.description))
+
+
+def _digest(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for path in sorted(folder.iterdir()):
+        if not path.is_file() or path.name == _TRAINED:
+            continue
+        digest.update(path.name.encode())
+        if path.name == NAME:
+            kept = {key: value for key, value in read_json(path).items() if key != "training"}
+            digest.update(json.dumps(kept).encode())
+        else:
+            with open_regular(path) as file:
+                hashlib.file_digest(file, lambda: digest)  # adds the file to it
+    return digest.hexdigest()[:16]
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from msgspec import Meta
 
 from handrail.collect.config import FPS_RANGE, MOST_TIME
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.flags import one_of, only_one
+from handrail.collect.flags import check_file, check_names, names, one_of, only_one
 from handrail.collect.seeds import MOST_ROLLOUTS, evaluation_seed
 from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names, Words
@@ -71,12 +71,12 @@ class EvaluateConfig(ExecutionConfig):
     @property
     def protections(self) -> tuple[str, ...]:
         """The protections asked for."""
-        return tuple(name.strip() for name in self.protection.split(",") if name.strip())
+        return names(self.protection, PROTECTIONS)
 
     @property
     def perturbations(self) -> tuple[Perturbation, ...]:
         """The perturbations asked for, each a condition of its own."""
-        return tuple(Perturbation.parse(text) for text in self.perturbation.split(",") if text.strip())
+        return tuple(Perturbation.parse(text) for text in names(self.perturbation, ()))
 
     @property
     def seeds(self) -> tuple[int, ...]:
@@ -89,15 +89,10 @@ class EvaluateConfig(ExecutionConfig):
         self.check_execution()
         if self.task:
             TASKS.check(self.task)
-        for name in self.protections:
-            if name not in PROTECTIONS:
-                raise unknown_name("protection", name, PROTECTIONS)
-        for flag, given in (("protection", self.protections), ("perturbation", self.perturbations)):
-            if not given or len(set(given)) != len(given):
-                raise HandrailError(f"--{flag} {getattr(self, flag)}: expected one or more, each once")
+        check_names("protection", "--protection", self.protections, PROTECTIONS)
+        if not self.perturbations or len(set(self.perturbations)) != len(self.perturbations):
+            raise HandrailError(f"--perturbation {self.perturbation}: expected one or more, each once")
         if not self.folders:
             raise HandrailError("policy: expected one checkpoint folder or more, as outputs/act; got none")
-        for flag, path, ending in (("json", self.json, ".json"), ("video", self.video, ".mp4")):
-            file = Path(path).expanduser()
-            if path and not (path.endswith(ending) and file.absolute().parent.is_dir()):
-                raise HandrailError(f"--{flag} {path}: expected a {ending} file in an existing folder")
+        check_file("--json", self.json, ".json")
+        check_file("--video", self.video, ".mp4")

@@ -130,7 +130,7 @@ class TrainingRun:
             interrupts.deferred(),
         ):
             bar = progress.add_task("", total=self._end, completed=self._step)
-            batches, ends = self._batches(), False
+            batches, ends = self._batches(self._step), False
             while self._step < self._end and not ends:
                 self._step += 1
                 began = time.perf_counter()
@@ -189,13 +189,10 @@ class TrainingRun:
         accelerator: Any = self._accelerator
         return MetricsTracker(*sizes, meters, self._step, accelerator)
 
-    def _batches(self) -> Iterator[Any]:
-        """Yield batches for ever, from where a training that was cut off would have gone on, to the bit."""
-        settings, episodes, processes = (
-            self._settings,
-            self._learnt.meta.episodes,
-            self._accelerator.num_processes,
-        )
+    def _batches(self, step: int) -> Iterator[Any]:
+        """Yield batches for ever, from where a training that was cut off after a step goes on, to the bit."""
+        settings, processes = self._settings, self._accelerator.num_processes
+        episodes = self._learnt.meta.episodes
         sampler = EpisodeAwareSampler(
             episodes["dataset_from_index"],
             episodes["dataset_to_index"],
@@ -203,7 +200,7 @@ class TrainingRun:
             shuffle=True,
             seed=settings.seed or 0,
         )
-        state = compute_sampler_state(self._step, len(sampler), settings.batch_size, processes)
+        state = compute_sampler_state(step, len(sampler), settings.batch_size, processes)
         sampler.load_state_dict(state)
         order: Any = BatchSampler(sampler, settings.batch_size, drop_last=False)
         if processes > 1:
