@@ -89,7 +89,7 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
         sockets.close()
         body.close()
         env.close()
-        summary = loop.log.summary()
+        summary = loop.summary()
         if config.json:
             write_json(Path(config.json).expanduser(), summary)
         say(json.dumps({name: value for name, value in summary.items() if name != "episodes"}))

@@ -57,7 +57,9 @@ class LeKiwiLoop:
         start: now [s].
 
     Attributes:
-        log: what happened.
+        malformed: commands that made no sense.
+        stops: of the base, by the watchdog.
+        episodes: how each went.
     """
 
     def __init__(self, body: LeKiwiBody, config: HostConfig, start: float) -> None:
@@ -69,9 +71,11 @@ class LeKiwiLoop:
         self._stopped, self._episode = False, 0.0
         self._pictures: dict[str, bytes] = {}
         self._painted = -math.inf
-        self.log = HostLog()
-        body.reset(config.seed)
-        self.log.begin(config.seed)
+        self.malformed = self.stops = 0
+        self.episodes: list[dict[str, Any]] = []
+        self._times: list[float] = []  # of commands that were followed [s]
+        self._ages: list[float] = []  # of those that say when they were sent [s]
+        self._begin(config.seed)
 
     def tick(self, now: float, received: Iterable[bytes], wall: float = math.nan) -> list[bytes] | None:
         """Do one round; return the parts of the message to send, if one is due.
@@ -87,21 +91,40 @@ class LeKiwiLoop:
             self._take(message, now, wall)
         if now - self._heard > self._config.watchdog_timeout_ms / 1000.0 and not self._stopped:
             self._stopped = True
-            self.log.stops += 1
+            self.stops += 1
             self._body.stop_base()
         self._body.advance(now - self._began)
-        self.log.see(self._body)
+        body = self._body
+        seen = {"success_at": body.done_at, "contacts": body.contacts, "seconds": body.time}
+        self.episodes[-1] |= seen | {"base": body.base.round(4).tolist()}
         self._answers.put(self._answer(now), now)
-        self.log.lost = self._commands.lost + self._answers.lost
         return self._answers.newest(now)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what it saw; intervals and ages in [ms]."""
+        gaps = np.diff(self._times)
+        gaps = gaps[gaps < 0.5]  # within an episode
+        return {
+            "commands": len(self._times),
+            "rate_hz": round(1.0 / float(np.mean(gaps)), 2) if len(gaps) else None,
+            "interval_ms": _percentiles(gaps),
+            "command_age_ms": _percentiles(np.array(self._ages)),
+            "malformed": self.malformed,
+            "messages_lost": self._commands.lost + self._answers.lost,
+            "base_stops": self.stops,
+            "base_speed": self._body.speed,
+            "episodes": self.episodes,
+        }
 
     def _take(self, message: bytes, now: float, wall: float) -> None:
         command = _parsed(message)
         if command is None or not self._take_episode(command, now) or not self._body.take(command):
-            self.log.malformed += 1
+            self.malformed += 1
             return
         self._heard, self._stopped = now, False
-        self.log.commanded(now, wall - number(command, SENT))
+        self._times.append(now)
+        if math.isfinite(age := wall - number(command, SENT)):
+            self._ages.append(age)
 
     def _take_episode(self, command: dict[str, Any], now: float) -> bool:
         """Begin the episode that a command asks for, if it does; whether that made sense."""
@@ -113,9 +136,12 @@ class LeKiwiLoop:
         if episode != self._episode:
             self._episode, self._began = episode, now
             self._pictures.clear()
-            self._body.reset(int(seed))
-            self.log.begin(int(seed))
+            self._begin(int(seed))
         return True
+
+    def _begin(self, seed: int) -> None:
+        self._body.reset(seed)
+        self.episodes.append({"seed": seed})
 
     def _answer(self, now: float) -> list[bytes]:
         """Return LeKiwi's observation: a header, and a JPEG a camera; of a lost one nothing."""
@@ -126,56 +152,6 @@ class LeKiwiLoop:
             self._pictures = {name: b"" if name == lost else _jpeg(self._body, name) for name in cameras}
         header = {"_cams": list(cameras), **self._body.observation()}
         return [json.dumps(header).encode(), *(self._pictures.get(name, b"") for name in cameras)]
-
-
-class HostLog:
-    """What a host saw: commands, and how each episode went.
-
-    Attributes:
-        malformed: commands that made no sense.
-        stops: of the base, by the watchdog.
-        lost: messages, on purpose.
-        episodes: one table each.
-    """
-
-    def __init__(self) -> None:
-        self.malformed = self.stops = self.lost = 0
-        self.episodes: list[dict[str, Any]] = []
-        self._times: list[float] = []
-        self._ages: list[float] = []
-        self._speed = 0.0
-
-    def begin(self, seed: int) -> None:
-        """Take note that an episode begins."""
-        self.episodes.append({"seed": seed, "success_at": math.nan, "contacts": 0, "seconds": 0.0})
-
-    def commanded(self, now: float, age: float) -> None:
-        """Take note of a command that was followed."""
-        self._times.append(now)
-        if math.isfinite(age):
-            self._ages.append(age)
-
-    def see(self, body: LeKiwiBody) -> None:
-        """Take note of how the episode stands."""
-        base, self._speed = body.base.round(4).tolist(), body.speed
-        seen = {"success_at": body.done_at, "contacts": body.contacts, "seconds": body.time, "base": base}
-        self.episodes[-1] |= seen
-
-    def summary(self) -> dict[str, Any]:
-        """Return it as one table; intervals and ages in [ms]."""
-        gaps = np.diff(self._times)
-        gaps = gaps[gaps < 0.5]  # within an episode
-        return {
-            "commands": len(self._times),
-            "rate_hz": round(1.0 / float(np.mean(gaps)), 2) if len(gaps) else None,
-            "interval_ms": _percentiles(gaps),
-            "command_age_ms": _percentiles(np.array(self._ages)),
-            "malformed": self.malformed,
-            "messages_lost": self.lost,
-            "base_stops": self.stops,
-            "base_speed": self._speed,
-            "episodes": self.episodes,
-        }
 
 
 def _percentiles(seconds: np.ndarray) -> dict[str, float] | None:

@@ -58,7 +58,7 @@ def test_the_base_stops_when_no_command_comes_and_the_arm_stays():
     said = hosted.go(0.6)
     assert abs(said["x.vel"]) < 1e-3
     assert said["arm_elbow_joint.pos"] == pytest.approx(held, abs=0.1)
-    assert hosted.loop.log.stops == 1
+    assert hosted.loop.stops == 1
     assert hosted.go(0.5, AHEAD)["x.vel"] == pytest.approx(0.1, abs=0.01)  # and goes on with the next one
 
 
@@ -80,19 +80,19 @@ def test_nonsense_moves_nothing_and_is_no_sign_of_life(nonsense):
     hosted.go(0.5, AHEAD)
     said = hosted.go(1.5, nonsense)
     assert abs(said["x.vel"]) < 1e-3
-    assert hosted.loop.log.stops == 1
-    assert hosted.loop.log.malformed == 45
+    assert hosted.loop.stops == 1
+    assert hosted.loop.malformed == 45
 
 
 def test_a_seed_begins_an_episode_once():
     hosted = Hosted()
     here = {**AHEAD, EPISODE: 1.0, SEED: 7.0, SENT: 1000.0}
     hosted.go(1.0, here)
-    assert [each["seed"] for each in hosted.loop.log.episodes] == [0, 7]
+    assert [each["seed"] for each in hosted.loop.episodes] == [0, 7]
     assert hosted.body.time == pytest.approx(1.0, abs=0.1)
     hosted.go(1.0, {**here, EPISODE: 2.0})
     assert hosted.body.time == pytest.approx(1.0, abs=0.1)
-    ages = hosted.loop.log.summary()["command_age_ms"]
+    ages = hosted.loop.summary()["command_age_ms"]
     assert ages["p50"] == pytest.approx(1000.0, abs=40.0)
 
 
@@ -107,7 +107,7 @@ def test_a_slow_network_is_late_by_as_much_and_loses_its_share():
     lossy = Hosted(drop=0.5)
     lossy.go(10.0, STILL)
     assert len(lossy.answers) == pytest.approx(150, abs=30)
-    assert lossy.loop.log.summary()["messages_lost"] == pytest.approx(300, abs=45)
+    assert lossy.loop.summary()["messages_lost"] == pytest.approx(300, abs=45)
 
 
 def test_the_newest_message_wins():
