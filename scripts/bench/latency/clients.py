@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import defaultdict
 from contextlib import suppress
 from typing import Any
 
@@ -54,12 +55,11 @@ class DrivingPage(Page):
 
     def __init__(self, address: str) -> None:
         super().__init__(address, "page-that-drives", self._see)
-        self.times: dict[str, list[float]] = {}
+        self.times = defaultdict[str, list[float]](list)
 
     def drive(self, seconds: float, rng: np.random.Generator) -> None:
         """Hold and let go for some time; where the robot has lost its input, begin anew."""
-        self.times = {"key to command": [], "key to page": [], "release to brake": [], "release to rest": []}
-        self.times["round trip"] = []
+        self.times.clear()
         self.frames = self.pictures = 0
         end, sign = time.monotonic() + seconds, 1.0
         while time.monotonic() < end:
@@ -67,18 +67,15 @@ class DrivingPage(Page):
             self.run(rng.uniform(*_RESTS))
             pressed = self._deflect(sign)
             came = self.until(lambda frame: _speed(frame) > _MOVES)
-            self._took("key to command", self.frame["commanded"] - pressed)
-            self._took("key to page", came - pressed)
+            self.times["key to command"].append(self.frame["commanded"] - pressed)
+            self.times["key to page"].append(came - pressed)
             self.run(_HOLDS)
             fastest = _speed(self.frame)
             released = self._deflect(0.0)
             self.until(lambda frame, most=fastest: _speed(frame) < most - _MOVES)
-            self._took("release to brake", self.frame["commanded"] - released)
+            self.times["release to brake"].append(self.frame["commanded"] - released)
             self.until(lambda frame: _speed(frame) < _MOVES)
-            self._took("release to rest", self.frame["commanded"] - released)
-
-    def _took(self, name: str, seconds: float) -> None:
-        self.times[name].append(seconds)
+            self.times["release to rest"].append(self.frame["commanded"] - released)
 
     def _deflect(self, value: float) -> float:
         """Push the base's stick; return when [s]."""
@@ -88,8 +85,8 @@ class DrivingPage(Page):
         return now
 
     def _see(self, frame: dict[str, Any]) -> None:
-        if frame["phase"] == "driving" and self.times:
-            self._took("round trip", frame["round_trip"])
+        if frame["phase"] == "driving":
+            self.times["round trip"].append(frame["round_trip"])
         if frame["phase"] == "lost":
             self.axes = [0.0] * len(self.channels)
 

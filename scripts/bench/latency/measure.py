@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +25,6 @@ from handrail.scripts.bench.report import ReportConfig, machine, report, spread
 
 FPS = 20  # [Hz]
 _SLOW_PAUSE = 0.2  # of a page that takes things slowly [s]
-_SPREAD = ("p50", "p95", "p99", "worst")
 _LATENCIES = {
     "key to command": "key to commanded velocity",
     "key to page": "key to motion on the page",
@@ -79,12 +79,14 @@ def family(process: int) -> dict[int, str]:
     return found
 
 
-def _seconds(process: int) -> float:
-    """Return how long a process has kept a processor busy [s]."""
-    with contextlib.suppress(psutil.Error):
-        times = psutil.Process(process).cpu_times()
-        return times.user + times.system
-    return 0.0
+def _spent(recording: int) -> Mapping[str, float]:
+    """Return how long our programs have kept a processor busy [s], by what they are."""
+    spent = defaultdict[str, float](float)
+    for process, words in family(os.getpid()).items():
+        with contextlib.suppress(psutil.Error):
+            name = "recording" if process == recording else _program(words)
+            spent[name] += sum(psutil.Process(process).cpu_times()[:2])
+    return spent
 
 
 @contextlib.contextmanager
@@ -157,17 +159,13 @@ def _recording(root: Path, config: LatencyConfig, episodes: int) -> Iterator[tup
 def _drive(
     page: DrivingPage, watching: list[Spectator], duration: float, rng: np.random.Generator, process: int
 ) -> dict[str, Any]:
-    before = [(each.frames, each.pictures) for each in watching]
-    spent = {each: _seconds(each) for each in family(os.getpid())}
-    start = time.monotonic()
+    counts = [(each.frames, each.pictures) for each in watching]
+    spent, start = _spent(process), time.monotonic()
     page.drive(duration, rng)
     took = time.monotonic() - start
-    after = [(each.frames, each.pictures) for each in watching]
-    frames, pictures = np.mean(np.subtract(after, before), axis=0) / took if watching else (0.0, 0.0)
-    shares: dict[str, float] = {}  # of one processor
-    for each, words in family(os.getpid()).items():
-        name = _program(words) if each != process else "recording"
-        shares[name] = shares.get(name, 0.0) + (_seconds(each) - spent.get(each, 0.0)) / took
+    shares = {name: (seconds - spent.get(name, 0.0)) / took for name, seconds in _spent(process).items()}
+    counts = np.subtract([(each.frames, each.pictures) for each in watching], counts)
+    frames, pictures = np.mean(counts, axis=0) / took if watching else (0.0, 0.0)
     return {
         "latencies_ms": {name: _spread(times) for name, times in page.times.items() if times},
         "driver_frames_hz": page.frames / took,
@@ -175,7 +173,7 @@ def _drive(
         "spectator_frames_hz": float(frames),
         "spectator_pictures_hz": float(pictures) / 2,
         "dropped": page.frame["dropped"],
-        "processor_shares": shares,
+        "processor_shares": shares,  # of one
     }
 
 
@@ -236,7 +234,7 @@ def _saved(root: Path, episode: int) -> dict[str, Any]:
 
 
 def _spread(times: list[float]) -> dict[str, float]:
-    return {**spread(times, _SPREAD), "n": len(times)}
+    return {**spread(times, ("p50", "p95", "p99", "worst")), "n": len(times)}
 
 
 def latency_table(results: Mapping[str, Any]) -> Table:

@@ -12,7 +12,6 @@ import numpy as np
 import torch
 from gymnasium import spaces
 from gymnasium.wrappers import TransformObservation
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
@@ -107,7 +106,7 @@ def actor_of(model: SAC) -> Actor:
 
 
 class Watch(BaseCallback):
-    """Evaluates and saves every so many steps, and shows how far the training is.
+    """Evaluates and saves every so many steps, and prints how far the training is.
 
     Args:
         config: of the training.
@@ -123,15 +122,8 @@ class Watch(BaseCallback):
         self._config, self._curve, self._interrupts = config, curve, interrupts
         self._goals = evaluation_goals(config.goals)
         self._began = time.monotonic() - seconds
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self._progress = Progress(*columns, console=Terminal())
-        self._bar = self._progress.add_task("training", total=config.steps)
-
-    def _on_training_start(self) -> None:
-        self._progress.start()
 
     def _on_step(self) -> bool:
-        self._progress.update(self._bar, completed=self.num_timesteps)
         if self.num_timesteps % self._config.save_every == 0:
             self._evaluate_and_save()
         return not self._interrupts.asked
@@ -141,7 +133,6 @@ class Watch(BaseCallback):
             self._evaluate_and_save()
         if not _is_evaluated(self.model, self._curve):  # an interrupt does not wait for that
             write_checkpoint(self._config.folder, self.model, None, [*self._curve, self._row()])
-        self._progress.stop()
 
     def _row(self) -> dict[str, float]:
         """Return how far the training is."""
@@ -160,9 +151,9 @@ class Watch(BaseCallback):
         for name, value in score.items():
             self.logger.record(f"evaluation/{name}", value)
         self.logger.dump(self.num_timesteps)
-        self._progress.console.print(
-            f"{self.num_timesteps} steps, {row['seconds']:.0f} s: {score['success']:.0%} of the goals, "
-            f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+        Terminal().print(
+            f"{self.num_timesteps} of {self._config.steps} steps, {row['seconds']:.0f} s: "
+            f"{score['success']:.0%} of the goals, effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
         )
         write_checkpoint(self._config.folder, self.model, actor, self._curve)
 
