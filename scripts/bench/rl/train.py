@@ -153,9 +153,13 @@ class Watch(BaseCallback):
         self.logger.dump(self.num_timesteps)
         Terminal().print(
             f"{self.num_timesteps} of {self._config.steps} steps, {row['seconds']:.0f} s: "
-            f"{score['success']:.0%} of the goals, effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+            f"{score['success']:.0%} of the goals, {_words(score)}"
         )
         write_checkpoint(self._config.folder, self.model, actor, self._curve)
+
+
+def _words(score: dict[str, float]) -> str:
+    return f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
 
 
 def new_model(config: TrainRlConfig) -> SAC:
@@ -232,8 +236,7 @@ def main(config: TrainRlConfig) -> int:
     score = {name: values["mean"] for name, values in record["final"].items()}
     console = Terminal()
     console.print(
-        f"{score['success']:.1%} of new goals after {record['curve'][-1]['steps']} steps, "
-        f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+        f"{score['success']:.1%} of new goals after {record['curve'][-1]['steps']} steps, {_words(score)}"
     )
     console.print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
     return 0
