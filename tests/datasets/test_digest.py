@@ -1,9 +1,7 @@
 """A digest of a recording covers its pictures, and does not depend on how the files lie."""
 
-import pytest
-from datasets_helpers import CAMERAS, create, frame_of, record
+from datasets_helpers import CAMERAS, create, frame_of
 
-from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.reading.digest import digest_of_dataset
 
 ROWS = 16  # letters of the digest of the rows
@@ -24,12 +22,3 @@ def test_one_other_picture_is_another_recording(tmp_path):
     assert one == again
     assert one[:ROWS] == other[:ROWS]
     assert one[ROWS:] != other[ROWS:]
-
-
-@pytest.mark.parametrize("cameras", [True, False])
-def test_a_packed_dataset_has_the_digest_that_it_had(cameras, tmp_path):
-    root = record(tmp_path / "set", 3, cameras)
-    merge_datasets([root], tmp_path / "packed")
-    before, after = digest_of_dataset(root), digest_of_dataset(tmp_path / "packed")
-    assert len(before) == (2 * ROWS if cameras else ROWS)
-    assert before == after

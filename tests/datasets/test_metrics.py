@@ -80,12 +80,6 @@ def test_chattering_golden_values():
     assert rate_of_change(bang, 10.0) == pytest.approx(20.0 * np.sqrt(2 / 4))
 
 
-def test_a_constant_command_does_not_chatter():
-    constant = np.full((50, 3), 0.7)
-    assert rate_of_change(constant, 50.0) == 0.0
-    assert high_frequency_content(constant, 50.0) == pytest.approx(0.0, abs=1e-12)
-
-
 @given(st.integers(1, 6), st.floats(0.1, 10.0))
 def test_chattering_grows_with_frequency_and_amplitude(cycles, scale):
     slow, fast = (np.sin(2 * np.pi * k * TIMES / 4.0)[:, None] for k in (cycles, 2 * cycles))

@@ -52,9 +52,10 @@ def test_columns(seed, rows, width, dtype, kind):
         _same(column_stats(flat), lerobot.get_feature_stats(flat, axis=0, keepdims=True))
 
 
-@pytest.mark.parametrize("shape", [(32, 48), (320, 480), (400, 310)])
-@pytest.mark.parametrize("count", [1, 7, 120])
-def test_pictures(shape, count):
+@pytest.mark.parametrize(
+    ("count", "shape"), [(1, (320, 480)), (7, (32, 48)), (7, (400, 310)), (120, (32, 48))]
+)
+def test_pictures(count, shape):
     generator = np.random.default_rng(count)
     pictures = generator.integers(0, 200, (count, *shape, 3), dtype=np.uint8)
     chosen = [pictures[i].transpose(2, 0, 1) for i in lerobot.sample_indices(count)]

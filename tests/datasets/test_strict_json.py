@@ -42,12 +42,6 @@ def root(tmp_path):
     return copied(tmp_path / "set", record, 2)
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_bad_json_is_one_line(name):
-    with pytest.raises(ValueError, match=r"\A[^\n]{1,200}\Z"):
-        parse_json(BAD[name])
-
-
 def test_plain_json_is_read():
     content = {"a": [1, 2.5, None, True, {"b": "ä"}], "seed": 2**63}
     assert parse_json(json.dumps(content).encode()) == content
@@ -221,15 +215,3 @@ def test_a_newer_format_is_refused_on_reading(root):
     done = command("--dataset.root", root, name="inspect")
     assert done.returncode == 2
     assert "a newer Handrail wrote it" in done.stderr
-
-
-def test_a_dataset_copied_in_part_is_called_so(root):
-    layout = Layout(root)
-    layout.data(1).unlink()
-    done = command("--dataset.root", root, name="inspect")
-    assert done.returncode == 2
-    assert "copied in part" in done.stderr
-    assert "file-001.parquet" in done.stderr
-    layout.row(1).unlink()
-    with pytest.raises(HandrailError, match=r"no episode 1.*copied in part"):
-        read_episodes(root)

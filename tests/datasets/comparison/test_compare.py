@@ -194,15 +194,3 @@ def test_wrong_input_is_one_line_and_code_2(arguments, message, ours, capsys, mo
     assert stop.value.code == cli.BAD_INPUT
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert re.search(message, line), line
-
-
-def test_the_command_says_what_it_found(ours, tmp_path, capsys, monkeypatch):
-    words = [*ours, "--output", str(tmp_path / "out"), "--no_pictures"]
-    monkeypatch.setattr("sys.argv", ["handrail-compare", *words])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    assert stop.value.code == 0
-    said = capsys.readouterr().out
-    assert said.startswith("Success while collecting: slow 50 %, quick 100 %")
-    assert "Successes an operator hour" in said
-    assert str(tmp_path / "out" / "report.html") in said

@@ -4,16 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import condition, judge, quick_and_slow
+from compare_helpers import condition, judge
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison import compare as comparing
 from handrail.datasets.comparison.collection import collected, success_difference
-from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.episodes import differences
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.policies import LIKE_FOR_LIKE, MIXED, Pair, judge_pairs, pairs_between
-from handrail.datasets.comparison.tables import metrics_table
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.episode_set import frames_of
@@ -116,15 +113,6 @@ def test_frames_of_episodes(most):
     for length, frames in zip(lengths, chosen, strict=True):
         assert len(set(frames)) == len(frames)
         assert set(frames) <= set(range(length))
-
-
-def test_a_table_describes_a_group_and_claims_nothing(tmp_path):
-    comparison = comparing.compare(CompareConfig(tuple(quick_and_slow(tmp_path))))
-    rows = {str(row[0]): row for row in metrics_table(comparison, "slow").rows}
-    for metric in OF_GROUP:
-        (row,) = [row for name, row in rows.items() if name.startswith(metric.title)]
-        assert {getattr(each, "look", "") for each in row} <= {"", "quiet"}
-        assert getattr(row[-1], "note", "").startswith("described, not tested")
 
 
 def test_the_success_that_is_shown_is_the_one_that_is_tested():

@@ -22,7 +22,7 @@ from handrail.datasets.comparison.figures import (
 from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.comparison.tables import collection_differences_table
-from handrail.datasets.presentation.drawing import new_figure, short
+from handrail.datasets.presentation.drawing import new_figure
 from handrail.datasets.quality.catalogue import METRICS
 
 LENGTH, DISTANCE = (next(m for m in METRICS if m.name == name) for name in ("length", "smallest_distance"))
@@ -148,19 +148,6 @@ def test_no_text_covers_another(alike):
     for panel in panels:
         assert not any(axes.get_title() for axes in panel.figure.axes)
         check_texts(panel.figure)
-
-
-def test_every_group_has_the_commands_that_leave_its_last_out(alike, page):
-    """By the length of an episode: the three longest of each."""
-    for group in alike.everything.groups:
-        longest = sorted(group.episodes, key=lambda each: (-each.count, each.number))[:3]
-        numbers = ",".join(str(each) for each in sorted(each.number for each in longest))
-        assert f"handrail-edit delete {group.info.root} --episodes {numbers} --output" in page
-
-
-def test_a_long_label_keeps_both_ends():
-    assert short("reach_ee", 8) == "reach_ee"
-    assert short("reach_ee_of_monday", 9) == "reac…nday"
 
 
 def test_the_headline_has_the_numbers_of_the_tables(ours):

@@ -217,11 +217,3 @@ def test_wrong_evaluations(tmp_path, content, message):
     with pytest.raises(HandrailError, match=message) as caught:
         read_evaluations([path])
     assert "\n" not in str(caught.value)
-
-
-def test_evaluations_that_are_not_there(tmp_path):
-    with pytest.raises(HandrailError, match="expected evaluations of policies, got"):
-        read_evaluations([tmp_path / "none.json"])
-    (tmp_path / "torn.json").write_text('{"format": ')
-    with pytest.raises(HandrailError, match="expected evaluations of policies, got"):
-        read_evaluations([tmp_path / "torn.json"])

@@ -8,7 +8,6 @@ import pyarrow.parquet as pq
 import pytest
 from canned import canned
 from command_helpers import command
-from datasets_guillotine import Guillotine
 from datasets_helpers import (
     CAMERAS,
     check_pictures,
@@ -32,7 +31,6 @@ from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording import file_group
 from handrail.datasets.recording.repair import repair
 
-GUILLOTINE = Guillotine()
 SUMMARIES = ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json")
 
 
@@ -76,29 +74,6 @@ def test_shards_become_what_one_recording_is(whole, tmp_path_factory, cuts, most
     assert tree(folder / "again") == files
     assert repair(folder / "all").clean
     assert not check_report(folder / "all")
-
-
-def test_shards_are_added_to_a_dataset_in_its_place(whole, tmp_path):
-    first, second = part(tmp_path / "first", 0, 3), part(tmp_path / "second", 3, 7)
-    (first / "notes.txt").write_text("mine")
-    assert merge_datasets([first, second], first).episodes == 7
-    assert content(first) == content(whole)
-    assert (first / "notes.txt").read_text() == "mine"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["first", "second"]
-
-
-def test_a_packed_dataset_goes_on_and_is_packed_again(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(file_group, "MOST_ROWS", 4000)
-    root = part(tmp_path / "set", 0, 4)
-    merge_datasets([root], root)
-    with resume(root) as writer:
-        for _ in range(2):
-            record_one(writer, cameras=False)
-    assert content(root) == content(whole)[:6]
-    assert repair(root).clean
-    merge_datasets([root], root)
-    assert content(root) == content(whole)[:6]
-    assert 1 < len(list(root.glob("data/*/*"))) < 6
 
 
 def test_a_dataset_of_an_earlier_version_is_read_and_packed_anew(tmp_path, monkeypatch):

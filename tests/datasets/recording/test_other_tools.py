@@ -75,16 +75,6 @@ def test_statistics_that_lerobot_computed_anew_are_replaced(tmp_path):
     assert json.loads(text)["index"]["count"] == [12 + length_of(1)]
 
 
-def test_statistics_never_come_from_the_file(root):
-    """Whoever wrote `stats.json`, what is recorded on is added to what the episodes say."""
-    path = Layout(root).stats
-    before, stats = path.read_bytes(), json.loads(path.read_bytes())
-    stats["action"]["mean"] = [1e6, 1e6]
-    path.write_text(json.dumps(stats))
-    resume(root, cameras=True).close()
-    assert path.read_bytes() == before
-
-
 def test_episodes_of_another_tool_are_not_touched(tmp_path):
     root = record(tmp_path / "set", 2)
     import pyarrow.parquet as pq
@@ -110,11 +100,3 @@ def test_resume_says_what_it_put_in_order(tmp_path):
     assert done.returncode == 2
     assert "episode 1" in done.stderr
     assert len(read_episodes(tmp_path / "set")) == 3
-
-
-def test_the_command_takes_a_folder_in_two_ways(tmp_path):
-    root = record(tmp_path / "set", 1)
-    for place in ([root], ["--dataset.root", root]):
-        assert "nothing to repair" in command(*place, name="edit repair").stdout
-    done = command(tmp_path, name="edit repair")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
