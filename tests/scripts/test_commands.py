@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -123,12 +122,6 @@ def test_help_loads_nothing_heavy():
     assert done.stdout.count("usage: handrail") >= 14
 
 
-def test_flags_are_written_as_lerobot_users_write_them(tmp_path):
-    flags = ["--task=reach", "--dataset.num_episodes=1", "--realtime=false", "--resume=false"]
-    ran(*flags, f"--dataset.root={tmp_path / 'd'}")
-    assert read_info(tmp_path / "d").episodes == 1
-
-
 def test_what_is_recorded_says_how_it_came_about(recorded):
     rows = read_episodes(recorded)
     assert [row["episode_index"] for row in rows] == [0, 1]
@@ -151,16 +144,6 @@ def test_a_replay_repeats_the_recording_exactly(recorded):
     assert "0.00e+00" in ran("--dataset.root", recorded, name="replay")
 
 
-def test_moving_obstacles_move_again_in_a_replay(tmp_path):
-    root = tmp_path / "d"
-    words = ["--task", "reach", "--dataset.root", root]
-    ran(*words, "--moving_obstacles", 1, "--dataset.num_episodes", 1)
-    assert json.loads(read_episodes(root)[0]["settings"])["moving_obstacles"] == 1
-    assert "mover_0.vx" in (read_info(root).features["observation.environment_state"].names or ())
-    assert replay_episode(root, 0)[0].largest == 0.0
-    refused(*words, "--resume")
-
-
 def test_a_replay_shows_when_the_commands_differ(recorded, monkeypatch):
     """The deviation is measured, not assumed."""
     honest = OpenDataset.frames
@@ -171,14 +154,6 @@ def test_a_replay_shows_when_the_commands_differ(recorded, monkeypatch):
 
     monkeypatch.setattr(OpenDataset, "frames", tampered)
     assert replay_episode(recorded, 0)[0].largest > 0.01
-
-
-def test_inspect_prints_every_episode(recorded):
-    shown = ran("--dataset.root", recorded, name="inspect")
-    assert "2 episodes, 2 succeeded" in shown
-    assert len(re.findall(r"^ *\d+  ee", shown, re.MULTILINE)) == 2
-    more = ran("--dataset.root", recorded, "--quality", name="inspect")
-    assert len(re.findall(r"^ *\d+  ee", more, re.MULTILINE)) == 4
 
 
 def test_resume_goes_on_with_new_seeds(tmp_path):

@@ -79,11 +79,6 @@ def test_an_untrained_act_drives_without_contact_and_repeatably(tmp_path):
         assert row["malformed"] == row["brakes"] == row["contacts"] == 0
 
 
-def test_the_rate_is_the_one_that_is_asked_for(honest):
-    (condition,), _ = policy_conditions(config(honest, fps=50))
-    assert condition.checkpoint.meta.fps == 50
-
-
 @pytest.mark.parametrize(
     ("size", "movers", "task"),
     [(7, 0, "reach"), (19, 2, "reach"), (28, 0, "pick_place"), (29, 0, "tray"), (9, 0, "drawer")],

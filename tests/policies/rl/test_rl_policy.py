@@ -82,7 +82,3 @@ def test_the_record_is_the_actor_s():
     lengths = [score["length"] for score in scores]
     assert said["length"]["min"] <= min(lengths)
     assert max(lengths) <= said["length"]["max"]
-
-
-def test_it_is_small():
-    assert (SHIPPED / "actor.npz").stat().st_size < 3_000_000

@@ -1,20 +1,17 @@
 """A study does every job once, goes on where it was, and reports what is there."""
 
-import errno
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from study_helpers import DESIGN, Starter, run_here
+from study_helpers import Starter, run_here
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import Pictures
 from handrail.policies.study.jobs import jobs
 from handrail.policies.study.load import design_names, load_design
-from handrail.policies.study.progress import read_json
 from handrail.policies.study.settings import fingerprint, recording, training
 
 
@@ -26,16 +23,6 @@ def test_every_job_once_then_none_again(tmp_path, preset):
     assert len(set(first.begun)) == len(first.begun)
     assert run_here(config, second) == 0
     assert second.begun == []
-
-
-def test_changed_settings_are_done_again_and_nothing_else(tmp_path, preset):
-    config = StudyConfig(preset, str(tmp_path / "study"))
-    assert run_here(config, Starter()) == 0
-    Path(preset).write_text(DESIGN.replace("steps = 10", "steps = 20"))
-    again = Starter()
-    assert run_here(config, again) == 0
-    expected = [job.name for job in jobs(load_design(preset)) if job.policy]
-    assert sorted(again.begun) == sorted(expected)
 
 
 def test_a_failure_stops_only_what_needs_it(tmp_path, preset, capsys):
@@ -127,26 +114,3 @@ def test_policies_that_see_pictures_are_recorded_and_trained_so():
     other, wider = fingerprint(job, plain), replace(design, pictures=Pictures(("wrist",)))
     assert fingerprint(job, design)["recording"] != fingerprint(job, wider)["recording"]
     assert not {"cameras", "images"} & {*other["recording"], *other["training"]}
-
-
-def test_notes_are_whole_or_not_there(tmp_path):
-    path = tmp_path / "a" / "note.json"
-    assert read_json(path) == {}
-    write_json(path, {"a": 1})
-    assert read_json(path) == {"a": 1}
-    path.write_text('{"a": ')
-    assert read_json(path) == {}
-
-
-def test_a_disk_that_is_full_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
-    path = tmp_path / "note.json"
-    write_json(path, {"a": 1})
-
-    def full(descriptor):
-        raise OSError(errno.ENOSPC, "no space")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(OSError, match="no space"):
-        write_json(path, {"a": 2})
-    assert read_json(path) == {"a": 1}
-    assert list(tmp_path.iterdir()) == [path]
