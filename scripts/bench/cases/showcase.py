@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
+from msgspec import Meta
 
 from handrail.collect.operators.operator import View
 from handrail.collect.session.film import SIZE, Filmer
@@ -28,6 +29,7 @@ from handrail.controllers.objectives.hold import end_effector_hold, hold_paramet
 from handrail.controllers.objectives.switch import switchable, switched
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import Pose, RobotModel, load_model
+from handrail.controllers.typed import check_settings
 from handrail.datasets.presentation.drawing import png
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
@@ -48,7 +50,7 @@ class ShowcaseConfig:
     """Which: a, b or c."""
     output: str = "outputs/showcase"
     """Folder for the video, the figure and the JSON."""
-    seconds: float = 0.0
+    seconds: Annotated[float, Meta(ge=0, le=120)] = 0.0
     """How long [s]; the case's own length when 0."""
     video: bool = True
     """Whether to make the video (needs OpenGL)."""
@@ -62,10 +64,7 @@ class ShowcaseConfig:
         """Check what can be checked without loading anything heavy."""
         if self.case not in CASES:
             raise unknown_name("case", self.case, CASES)
-        if self.seconds != 0 and not 0.5 <= self.seconds <= 120.0:
-            raise HandrailError(
-                f"--seconds {self.seconds}: expected 0.5 to 120, or 0 for the case's own length"
-            )
+        check_settings(self, "--")
         if self.folder.exists() and not self.folder.is_dir():
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
 

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -27,7 +26,6 @@ from handrail.policies.rl.observation import (
     OBSERVATION_SIZE,
     TrackingSituation,
     base_velocity,
-    check_robot,
     observe,
 )
 from handrail.scripts.bench.goal_reaching.metrics import arm_effort, jerkiness
@@ -65,7 +63,6 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
     floor. `reset(options={"goal": Pose(…)})` sets the goal.
 
     Args:
-        robot: name or description file; its base must be planar and its arm must have six joints.
         early_failure: whether to give up an episode that has left the planner's pose.
         failure_cost: subtracted from the reward when an episode is given up.
         physics: MuJoCo, or an ideal robot whose overlapping shapes count as contacts.
@@ -74,14 +71,12 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def __init__(
         self,
-        robot: str | Path = "ridgeback_ur10",
         early_failure: bool = True,
         failure_cost: float = 0.0,
         physics: bool = True,
         repeat_missed: float = 0.0,
     ) -> None:
-        self.model = load_model(robot)
-        check_robot(self.model)
+        self.model = load_model()
         self.observation_space = spaces.Box(-_BOUND, _BOUND, (OBSERVATION_SIZE,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
         self.arm = ArmCompletion(self.model)

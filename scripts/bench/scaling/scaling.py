@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from handrail.collect.execution.config import MOST_WORKERS, ExecutionConfig
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_names, one_of
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import AtLeastOne, Count
-from handrail.datasets.lists import Names
+from handrail.datasets.lists import Names, Numbers
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.reading.digest import digest_of_dataset
 from handrail.datasets.reading.reader import read_episodes
@@ -37,7 +37,7 @@ class ScalingConfig(ReportConfig):
     """With which cameras: wrist, scene or both; none by default."""
     episodes: AtLeastOne = 60
     """Episodes of each recording."""
-    workers: Names = "1,2"
+    workers: Numbers = (1, 2)
     """Numbers of workers, each a recording of its own; the first is what the others are compared with."""
     ray: str = ""
     """One recording more, on a Ray cluster: auto, or its address (see docs/cluster.md)."""
@@ -50,18 +50,16 @@ class ScalingConfig(ReportConfig):
     @property
     def places(self) -> tuple[ExecutionConfig, ...]:
         """Where it is recorded, one after the other."""
-        words = [word.strip() for word in self.workers.split(",")]
-        if not all(word.isdecimal() and 1 <= int(word) <= MOST_WORKERS for word in words):
-            words = f"expected whole numbers from 1 to {MOST_WORKERS}, such as 1,2"
-            raise HandrailError(f"--workers {self.workers}: {words}")
         shared = (ExecutionConfig(ray=self.ray),) if self.ray else ()
-        return (*(ExecutionConfig(workers=int(word)) for word in words), *shared)
+        return (*(ExecutionConfig(workers=count) for count in self.workers), *shared)
 
     def check(self) -> None:
         """Check the settings."""
         super().check()
         check_names("task", "--task", (self.task,), TASKS)
         check_names("mode", "--mode", (self.mode,), MODES)
+        if min(self.workers, default=0) < 1:
+            raise HandrailError(f"--workers {self.workers}: expected whole numbers of 1 or more")
         for place in self.places:
             place.check_execution()
         if self.folder and not Path(self.folder).expanduser().is_dir():

@@ -15,7 +15,7 @@ from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, pose_error, 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import Pose, load_model
-from handrail.policies.rl.observation import TrackingSituation, base_velocity, observe
+from handrail.policies.rl.observation import TrackingSituation, base_velocity, check_robot, observe
 from handrail.scripts.bench.rl.env import GoalReachingEnv, reward_of
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -211,4 +211,4 @@ def test_a_robot_without_a_base_is_refused(tmp_path):
     path = tmp_path / "fixed.toml"
     path.write_text(text)
     with pytest.raises(HandrailError, match="expected a planar base and six arm joints"):
-        GoalReachingEnv(robot=path)
+        check_robot(load_model(path))
