@@ -48,10 +48,14 @@ class StudyPolicy:
 class StudyJob:
     """One piece of work: collect a cell's dataset, or train and evaluate a policy."""
 
-    name: str  # unique
     cell: StudyCell
     policy: StudyPolicy | None = None  # None collects
     robust: bool = False  # whether the policy also goes through the further conditions
+
+    @property
+    def name(self) -> str:
+        """A name for files and logs; unique."""
+        return f"policy/{self.policy.name}" if self.policy else f"collect/{self.cell.name}"
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -69,19 +73,15 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
     robust, beside = design.robustness is not None and draw < design.robustness.draws, design.beside
     cells = [[StudyCell(task, mode, draw) for mode in design.modes] for task in design.tasks]
     for each in cells:
-        yield from (StudyJob(f"collect/{cell.name}", cell) for cell in each)
-        yield from (_policy(StudyPolicy(cell), robust) for cell in each)
+        yield from map(StudyJob, each)
+        yield from (StudyJob(cell, StudyPolicy(cell), robust) for cell in each)
     if beside is None:
         return
     for cell in (cell for each in cells for cell in each):
         if draw < beside.draws and cell.mode in beside.intents:
-            yield _policy(StudyPolicy(cell, "intent"), robust)
+            yield StudyJob(cell, StudyPolicy(cell, "intent"), robust)
         if draw < beside.same_number:
-            yield _policy(StudyPolicy(cell, budget="number"), robust=False)
-
-
-def _policy(policy: StudyPolicy, robust: bool) -> StudyJob:
-    return StudyJob(f"policy/{policy.name}", policy.cell, policy, robust)
+            yield StudyJob(cell, StudyPolicy(cell, budget="number"))
 
 
 @dataclass(frozen=True)

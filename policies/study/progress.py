@@ -1,13 +1,12 @@
 """How a study stands: which jobs were done with its present settings, and what came of them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.storage import strict_json
@@ -28,7 +27,7 @@ class StudyProgress:
     @cached_property
     def done(self) -> frozenset[str]:
         """Names of the jobs that are done, as they were when this was first asked."""
-        return frozenset(job.name for job in self.jobs if is_done(job, self.design, self.layout))
+        return frozenset(job.name for job in self.jobs if self._is_done(job))
 
     @property
     def missing(self) -> list[str]:
@@ -44,6 +43,21 @@ class StudyProgress:
         needed = {name for job in chosen if job.name not in self.done for name in job.needs}
         gone = {job.name for job in chosen if job.name in needed and not self._has_dataset(job)}
         return [job for job in chosen if job.name not in self.done or job.name in gone]
+
+    def _is_done(self, job: StudyJob) -> bool:
+        """Return whether a job was done with just these settings, and the small files it made are there.
+
+        Datasets and policies may be gone: what is to be known of them is in the job's note and its rollouts.
+        """
+        if self._notes[job.name].get("settings") != fingerprint(job, self.design):
+            return False
+        if (policy := job.policy) is None:
+            return True
+        wanted = evaluations(job, self.design)
+        try:
+            return all(_has_rollouts(self.layout.evaluation(policy, w), c) for w, c in wanted.items())
+        except HandrailError:
+            return False
 
     def _has_dataset(self, job: StudyJob) -> bool:
         """Return whether the dataset that a job noted is still there, whole."""
@@ -71,22 +85,6 @@ class StudyProgress:
     def jobs(self) -> list[StudyJob]:
         """All jobs of the study."""
         return jobs(self.design)
-
-
-def is_done(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> bool:
-    """Return whether a job was done with just these settings, and the small files it made are there.
-
-    Datasets and policies may be gone: what is to be known of them is in the job's note and its rollouts.
-    """
-    if note_of(job, layout).get("settings") != fingerprint(job, design):
-        return False
-    if job.policy is None:
-        return True
-    try:
-        wanted = evaluations(job, design).items()
-        return all(_has_rollouts(layout.evaluation(job.policy, what), each) for what, each in wanted)
-    except HandrailError:
-        return False
 
 
 def note_of(job: StudyJob, layout: StudyLayout) -> dict[str, Any]:
@@ -123,10 +121,3 @@ def designs(layout: StudyLayout) -> list[dict[str, str]]:
     found = read_json(layout.designs).get("designs", [])
     listed = found if isinstance(found, list) else []
     return [each for each in listed if isinstance(each, dict) and {"digest", "since"} <= each.keys()]
-
-
-def check_cell(name: str, jobs: Sequence[StudyJob]) -> None:
-    """Check that a study has a cell of a name; none is all."""
-    cells = dict.fromkeys(job.cell.name for job in jobs)
-    if name and name not in cells:
-        raise unknown_name("cell of the study", name, cells)

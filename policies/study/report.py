@@ -76,7 +76,7 @@ def _report(
             *by_task,
             ("Again", [table for table in again if table.rows]),
         ],
-        how=how(design),
+        how=f"{_HOW} {plan(design)}",
         content=_content(config, results, found),
         contrasts=found,
     )
@@ -147,11 +147,6 @@ def _told(each: Contrast) -> str:
     seen = f"{'a' if each.detected else 'no'} difference detected"
     verdict = "not tested before all draws are done" if each.p_adjusted is None else seen
     return f"{name}: {points(each.estimate)} points (95 % {points_span(interval)}), {verdict}."
-
-
-def how(design: StudyDesign) -> str:
-    """Return the paragraph: what was drawn, trained and tested, and what that can detect."""
-    return f"{_HOW} {plan(design)}"
 
 
 def cautions(results: Results) -> list[str]:

@@ -10,14 +10,14 @@ from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
-from handrail.policies.imitation.config import check_installed
+from handrail.policies.imitation.config import TrainConfig, check_installed
+from handrail.policies.imitation.training.presets import policy_config
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.design import StudyDesign, check_known
 from handrail.policies.study.jobs import StudyJob, StudyLayout
 from handrail.policies.study.load import load_design
 from handrail.policies.study.power import plan
-from handrail.policies.study.progress import StudyProgress, check_cell, note_design
-from handrail.policies.study.settings import check_policies
+from handrail.policies.study.progress import StudyProgress, note_design
 from handrail.policies.study.work import do
 
 _PRELOAD = ("handrail.policies.study.preload",)
@@ -35,7 +35,10 @@ def run_study(config: StudyConfig, work: Work = do, isolated: bool = True) -> in
     config.check()
     design = load_design(config.preset)
     progress, console = StudyProgress(design, StudyLayout(config.folder)), Terminal(stderr=True)
-    check_cell(config.only, progress.jobs)
+    if config.only:
+        check_known(
+            "cell of the study", (config.only,), dict.fromkeys(job.cell.name for job in progress.jobs)
+        )
     told = f"study {design.name}, design {design.digest}: {len(progress.jobs)} jobs. {plan(design)}"
     console.print(told)
     if config.plan:
@@ -62,7 +65,7 @@ def _work(
     note_design(layout, design)
     todo = progress.todo(config.only)
     if any(job.policy for job in todo):
-        check_policies(design)
+        policy_config(TrainConfig(policy=design.policy))  # refuses what LeRobot does not know
     for job in todo:
         with explained(str(layout.log(job))):
             layout.log(job).unlink(missing_ok=True)  # of an earlier time

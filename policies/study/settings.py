@@ -1,7 +1,5 @@
 """The settings of every job: the configs it runs with, and of them what its result depends on."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +7,7 @@ from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.training.presets import as_json, check_policy, resolved
+from handrail.policies.imitation.training.presets import as_json, resolved
 from handrail.policies.study.design import MOST_DRAWS, StudyDesign
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
@@ -122,29 +120,15 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
 def check_jobs(design: StudyDesign) -> None:
     """Check the settings of every job of a study before one begins."""
     for job in jobs(design):
-        with _named(design, job):
+        try:
             recording(job.cell, design, _DATASET).check()
             if job.policy:
                 training(job.policy, design, _DATASET, _POLICY).check()
                 for config in evaluations(job, design).values():
                     config.check()
-
-
-def check_policies(design: StudyDesign) -> None:
-    """Build the policy of every task once, untrained; loads PyTorch."""
-    firsts = {job.cell.task: (job, job.policy) for job in reversed(jobs(design)) if job.policy}
-    for job, policy in firsts.values():
-        with _named(design, job):
-            check_policy(training(policy, design, _DATASET, _POLICY))
+        except HandrailError as error:
+            raise HandrailError(f"study {design.name}, {job.name}: {error}") from error
 
 
 def _some(config: Any, names: tuple[str, ...]) -> dict[str, Any]:
     return {name: getattr(config, name) for name in names}
-
-
-@contextmanager
-def _named(design: StudyDesign, job: StudyJob) -> Iterator[None]:
-    try:
-        yield
-    except HandrailError as error:
-        raise HandrailError(f"study {design.name}, {job.name}: {error}") from error

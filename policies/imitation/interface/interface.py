@@ -184,12 +184,12 @@ class PolicyInterface:
     @cached_property
     def _objects(self) -> list[tuple[str, tuple[str, ...], int]]:
         """Neighbouring numbers of the environment whose names begin alike: name, parts, where they begin."""
-        found, split = (
-            list[tuple[str, tuple[str, ...], int]](),
-            [n.rpartition(".") for n in self.environment_names],
-        )
-        for name, group in groupby(split, key=lambda each: each[0]):
-            found.append((name, tuple(part for *_, part in group), sum(len(parts) for _, parts, _ in found)))
+        found: list[tuple[str, tuple[str, ...], int]] = []
+        start = 0
+        for name, group in groupby(self.environment_names, key=lambda each: each.rpartition(".")[0]):
+            parts = tuple(each.rpartition(".")[2] for each in group)
+            found.append((name, parts, start))
+            start += len(parts)
         return found
 
     def _pose(self, state: FloatArray) -> RobotPose:

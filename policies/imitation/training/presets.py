@@ -117,26 +117,6 @@ def in_one_line(config: TrainConfig) -> Iterator[None]:
         raise HandrailError(f"policy {config.policy}: {message_of(error)}") from error
 
 
-def check_policy(config: TrainConfig) -> None:
-    """Build a policy once, for made-up inputs, so that what it refuses is known before there is data.
-
-    Only its settings are checked where Handrail has no sizes for it: such a policy may load something.
-    """
-    described = policy_config(config)
-    if (config.policy, config.preset) not in _PRESETS:
-        return
-    from lerobot.configs.types import FeatureType, PolicyFeature
-    from lerobot.policies.factory import get_policy_class
-
-    described.input_features = {
-        "observation.state": PolicyFeature(FeatureType.STATE, (2,)),
-        "observation.environment_state": PolicyFeature(FeatureType.ENV, (2,)),
-    }
-    described.output_features = {"action": PolicyFeature(FeatureType.ACTION, (2,))}
-    with in_one_line(config):
-        get_policy_class(config.policy)(described)
-
-
 def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
     """Check that settings are those of a checkpoint, and its sizes still those of the preset."""
     sizes, least = resolved(config), began.sizes.steps
