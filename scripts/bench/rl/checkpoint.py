@@ -1,9 +1,10 @@
 """The folder of a training run: settings, the last checkpoint, every evaluated actor.
 
-Stable-Baselines3's own loader unpickles what it finds, and so runs the code of whoever wrote it. Only arrays
-are read here: networks and optimisers from `model.zip`, transitions from `replay_buffer.npz`.
+Stable-Baselines3's own loader unpickles what it finds, and so runs the code of whoever wrote it. A checkpoint
+is one file of tensors and numbers, and nothing else is read of it.
 """
 
+import math
 import re
 import shutil
 from collections.abc import Mapping
@@ -11,14 +12,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 import torch
 from stable_baselines3 import SAC
-from stable_baselines3.common.buffers import ReplayBuffer
-from stable_baselines3.common.save_util import load_from_zip_file
 
 from handrail.controllers.errors import HandrailError, message_of, shown
-from handrail.controllers.regular_file import open_regular, regular
+from handrail.controllers.regular_file import open_regular
 from handrail.controllers.typed import NonNegative, check, decoded
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.datasets.storage.strict_json import load_json, write_json
@@ -33,12 +31,11 @@ SHOWN = {
     "jerkiness": "jerkiness [m/s², rad/s²]",
 }
 """What the figure of a curve shows."""
-_NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
+_STATE = "state.pt"
 _ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 _UNTIL = {"steps", "updates", "seconds"}  # what the last row of the curve has, of an interrupted run
 _ROW = {*_UNTIL, *SHOWN}  # and every other one
 _STEPS = re.compile(r"\d{8}", re.ASCII)  # name of a checkpoint
-_ENTROPY = "log_ent_coef"
 
 
 def begin_run(config: TrainRlConfig) -> None:
@@ -66,16 +63,21 @@ def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
         last: checkpoint of the run.
         model: untrained, with the same settings.
     """
-    curve = _curve(last / _CURVE, int(last.name))
-    parameters, variables = _tensors(last / _NETWORKS)
+    state, buffer = _state(last), model.replay_buffer
+    assert buffer is not None
+    curve = _curve(state, last)
     try:
-        model.set_parameters(dict(parameters), exact_match=True, device="cpu")
+        model.set_parameters(state["networks"], exact_match=True, device="cpu")
         with torch.no_grad():
-            cast(torch.Tensor, model.log_ent_coef).copy_(variables[_ENTROPY])
+            cast(torch.Tensor, model.log_ent_coef).copy_(state["temperature"])
+        buffer.pos, buffer.full = state["place"]
+        for name in _ARRAYS:
+            values, target = state["transitions"][name].numpy(), getattr(buffer, name)[: buffer.size()]
+            if values.shape != target.shape or buffer.pos not in range(buffer.buffer_size):
+                raise ValueError(f"{name} of shape {values.shape}, next to be written {buffer.pos}")
+            target[...] = values
     except Exception as error:  # of PyTorch: whatever the tensors are, they do not fit
-        raise _broken(last / _NETWORKS, error) from error
-    assert model.replay_buffer is not None
-    _read_transitions(last / _TRANSITIONS, model.replay_buffer)
+        raise _broken(last, error) from error
     model.num_timesteps, model._n_updates = int(last.name), int(curve[-1]["updates"])
     evaluated = [row for row in curve if row.keys() >= _ROW]
     return evaluated, curve[-1]["seconds"]
@@ -84,11 +86,11 @@ def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
 def start_from(folder: Path, model: SAC) -> None:
     """Give a model the actor and critics of a run's last checkpoint, not the optimisers' memory."""
     last = _last(folder, "--start_from")
-    parameters, _ = _tensors(last / _NETWORKS)
+    state = _state(last)
     try:
-        model.policy.load_state_dict(parameters["policy"])
+        model.policy.load_state_dict(state["networks"]["policy"])
     except Exception as error:  # of PyTorch: whatever the tensors are, they do not fit
-        raise _broken(last / _NETWORKS, error) from error
+        raise _broken(last, error) from error
 
 
 def write_checkpoint(folder: Path, model: SAC, actor: Actor | None, curve: Curve) -> None:
@@ -108,12 +110,11 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor | None, curve: Curve
     partial = final.with_suffix(".partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    model.save(partial / _NETWORKS)
     buffer = model.replay_buffer
     assert buffer is not None
-    arrays: dict[str, Any] = {name: getattr(buffer, name)[: buffer.size()] for name in _ARRAYS}
-    np.savez(partial / _TRANSITIONS, place=np.array([buffer.pos, buffer.full]), **arrays)
-    write_json(partial / _CURVE, curve)
+    arrays = {name: torch.from_numpy(getattr(buffer, name)[: buffer.size()].copy()) for name in _ARRAYS}
+    state = {"networks": model.get_parameters(), "temperature": model.log_ent_coef, "curve": curve}
+    torch.save(state | {"place": [buffer.pos, buffer.full], "transitions": arrays}, partial / _STATE)
     publish_folder(partial, final)
     for path in earlier[-1:]:
         shutil.rmtree(path)
@@ -137,56 +138,37 @@ def _last(folder: Path, flag: str) -> Path:
     return found[-1]
 
 
-def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
-    """Return state dictionaries and single tensors of a model; what is pickled beside them is not read."""
+def _state(folder: Path) -> Mapping[str, Any]:
+    """Return tensors and numbers of a checkpoint."""
     try:
-        _, parameters, variables = load_from_zip_file(regular(path), load_data=False, device="cpu")
+        with open_regular(folder / _STATE) as file:
+            state = torch.load(file, weights_only=True, map_location="cpu")
     except Exception as error:  # of zipfile, pickle and PyTorch: whatever the file holds, it is refused
-        raise _broken(path, error) from error
-    if not _is_finite([parameters, variables]):
-        raise _broken(path, "NaN or infinity")
-    return parameters, variables or {}
+        raise _broken(folder, error) from error
+    if not isinstance(state, Mapping) or not _is_finite(state):
+        raise _broken(folder, "something else, NaN or infinity")
+    return state
 
 
 def _is_finite(content: Any) -> bool:
-    """Return whether every tensor in nested state dictionaries is finite."""
+    """Return whether every number in nested dictionaries and lists is finite."""
     if isinstance(content, torch.Tensor):
         return bool(content.isfinite().all())
+    if isinstance(content, float):
+        return math.isfinite(content)
     inside = content.values() if isinstance(content, Mapping) else content
-    return all(map(_is_finite, inside)) if isinstance(content, Mapping | list) else True
+    return all(map(_is_finite, inside)) if isinstance(content, Mapping | list | tuple) else True
 
 
-def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
-    if not path.is_file():
-        words = "found none; --start_from begins a new run with the networks of this one"
-        raise HandrailError(f"{str(path)!r}: expected the transitions of a run, {words}")
-    try:
-        with open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:
-            place, full = map(int, arrays["place"])
-            found = {name: arrays[name] for name in _ARRAYS}
-    except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
-        raise _broken(path, error) from error
-    if not 0 <= place < buffer.buffer_size:
-        raise _broken(path, f"place {place}")
-    buffer.pos, buffer.full = place, bool(full)
-    for name, values in found.items():
-        target = getattr(buffer, name)[: buffer.size()]
-        if values.shape != target.shape or values.dtype.kind not in "fi" or not np.isfinite(values).all():
-            raise _broken(path, f"{name} of shape {values.shape}, numbers or not, finite or not")
-        target[...] = values
-
-
-def _curve(path: Path, steps: int) -> Curve:
-    """Return the curve of a checkpoint after so many steps."""
-    what = "the curve of a training run"
-    where = f"{str(path)!r}: expected {what} until step {steps}"
-    rows = check(load_json(path, what), list[dict[str, NonNegative]], where)
+def _curve(state: Mapping[str, Any], last: Path) -> Curve:
+    where = f"{str(last / _STATE)!r}: expected the curve of a training run until step {int(last.name)}"
+    rows = check(state.get("curve"), list[dict[str, NonNegative]], where)
     whole = all(row.keys() >= _ROW for row in rows[:-1]) and all(row.keys() >= _UNTIL for row in rows[-1:])
-    if not rows or not whole or rows[-1]["steps"] != steps:
+    if not rows or not whole or rows[-1]["steps"] != int(last.name):
         raise HandrailError(f"{where}, got {shown(rows)}")
     return rows
 
 
-def _broken(path: Path, reason: str | Exception) -> HandrailError:
+def _broken(folder: Path, reason: str | Exception) -> HandrailError:
     found = reason if isinstance(reason, str) else message_of(reason)
-    return HandrailError(f"{str(path)!r}: expected a checkpoint of this run, got {found}")
+    return HandrailError(f"{str(folder / _STATE)!r}: expected a checkpoint of this run, got {found}")
