@@ -91,7 +91,6 @@ class Rows[Row]:
         key: what is different in every row.
         programs: whose versions the file names.
         name: of the rows in the file.
-        unnamed: settings of files from before there was a choice.
     """
 
     def __init__(
@@ -102,14 +101,13 @@ class Rows[Row]:
         key: Callable[[Row], Any],
         programs: Sequence[str],
         name: str = "rows",
-        unnamed: Mapping[str, Any] | None = None,
     ) -> None:
         self._flag, self._path = f"--json {path}", Path(path).expanduser()
         self._head, self._kind, self._key, self._name = {**head}, kind, key, name
         self._programs, self._is_kept = programs, bool(path)
         self._rows: dict[Any, Row] = {}
         if path and self._path.exists():
-            self._read(unnamed or {})
+            self._read()
 
     def __contains__(self, key: object) -> bool:
         return key in self._rows
@@ -128,10 +126,10 @@ class Rows[Row]:
         with explained(self._flag):
             write_whole(self._path, text.encode())
 
-    def _read(self, unnamed: Mapping[str, Any]) -> None:
+    def _read(self) -> None:
         try:
             content = read_json(self._path)
-            found = {name: content.get(name, unnamed.get(name)) for name in self._head}
+            found = {name: content.get(name) for name in self._head}
             if found != self._head:
                 words = f"expected {self._head}, got {found}; choose another file"
                 raise HandrailError(f"{self._flag}: {words}")

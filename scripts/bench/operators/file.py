@@ -62,7 +62,6 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
 
 
 FORMAT = "handrail.trials/1"
-_UNNAMED = {"robot": "ridgeback_ur10"}  # of files from before there was a choice
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def trials_file(config: TrialsConfig) -> Rows[OperatorTrial]:
     """Return the file of the trials of one robot, seed, noise and number of persons."""
     settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
     head = {"format": FORMAT} | settings
-    return Rows(config.json, head, OperatorTrial, trial_key, SIMULATION, "trials", _UNNAMED)
+    return Rows(config.json, head, OperatorTrial, trial_key, SIMULATION, "trials")
 
 
 def trial_key(trial: OperatorTrial) -> tuple[str, str, int]:

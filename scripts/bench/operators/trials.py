@@ -73,22 +73,19 @@ def _line(group: Sequence[OperatorTrial]) -> list[str]:
     ]
 
 
-def run_trials(
-    config: TrialsConfig, told: Callable[[OperatorTrial], None], console: Terminal | None = None
-) -> list[OperatorTrial]:
+def run_trials(config: TrialsConfig, told: Callable[[OperatorTrial], None]) -> list[OperatorTrial]:
     """Run what is not in the file yet, and return every episode that was asked for, in order.
 
     Args:
         config: of the trials.
         told: of each episode that was run.
-        console: to show how far it is; nothing without one.
     """
     config.check()
     file = trials_file(config)
     settings = replace(config, workers=1, ray="", json="trials.json", page="")  # what an episode depends on
     keys = list(product(config.task_names, config.mode_names, range(config.episodes)))
     jobs = [Job(" ".join(map(str, key)), run_trial, (settings, *key)) for key in keys if key not in file]
-    with Execution(config, "episodes", console, _PRELOAD) as execution:
+    with Execution(config, "episodes", preload=_PRELOAD) as execution:
         for result in execution.run(jobs):
             if result.error:
                 raise HandrailError(f"{result.job.name}: {result.error}")

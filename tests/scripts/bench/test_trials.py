@@ -51,17 +51,6 @@ def test_persons_take_turns_and_only_who_switches_loses_time(trials):
         assert trial.switching < min(trial.seconds, 0.5 * trial.switches + 1e-9)
 
 
-def test_a_file_from_before_robots_could_be_chosen_is_of_the_ur10(config, trials, tmp_path):
-    old = tmp_path / "old.json"
-    text = Path(config.json).read_text()
-    assert '"robot": "ridgeback_ur10", ' in text
-    old.write_text(text.replace('"robot": "ridgeback_ur10", ', "", 1))
-    file = trials_file(replace(config, json=str(old)))
-    assert all(("reach", "ee", episode) in file for episode in range(3))
-    with pytest.raises(HandrailError, match="choose another file"):
-        trials_file(replace(config, json=str(old), robot="ridgeback_panda"))
-
-
 @pytest.mark.parametrize("wrong", [{"seed": 1}, {"noise": 2.0}, {"persons": 3}, {"robot": "ridgeback_panda"}])
 def test_trials_of_other_settings_are_not_mixed(config, trials, wrong):
     with pytest.raises(HandrailError, match="choose another file"):
