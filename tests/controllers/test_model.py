@@ -94,8 +94,3 @@ def test_a_wrong_description_says_what_is_wrong(tmp_path, old, new, words):
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(HandrailError, match=re.escape(words)):
         load_description(path)
-
-
-def test_an_unknown_robot_lists_the_known():
-    with pytest.raises(HandrailError, match=r"unknown robot 'spot': .*ridgeback_ur10"):
-        load_description("spot")

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from canned import canned
 from command_helpers import command
 from compare_helpers import quick_and_slow
 
@@ -41,9 +42,9 @@ def test_what_is_harmless_stays(value):
 
 
 def test_a_report_has_no_formula(tmp_path):
-    roots = quick_and_slow(tmp_path)
+    sets = canned(quick_and_slow)
     words = ("--output", tmp_path / "out", "--no_pictures", "--labels", "=cmd|' /C calc'!A0", "b")
-    assert command(*roots, *words, name="compare").returncode == 0
+    assert command(sets / "quick", sets / "slow", *words, name="compare").returncode == 0
     for name in ("episodes.csv", "differences.csv"):
         rows = list(csv.DictReader(io.StringIO((tmp_path / "out" / name).read_text())))
         assert rows

@@ -70,22 +70,6 @@ def plain(page: str) -> str:
     return " ".join(text(page).replace("**", "").split())
 
 
-def test_the_answer_of_the_study_is_that_of_its_contrasts():
-    answer, readme = plain("docs/results/teleop_modes.md"), plain("README.md")
-    for one, other, points in (
-        ("ee", "ee_dls", "adds {} points"),
-        ("joints", "direct", "and {}, not detected"),
-    ):
-        (with_mpc, without), gain = contrast(f"{one} − {other}", "exploratory")
-        assert f"| `{one}` {with_mpc} % | `{other}` {without} % | {gain}, explored |" in answer
-        assert points.format(gain.split()[0].lstrip("+")) in readme
-        assert re.search(rf"\({with_mpc} (instead of|and) {without} %\)", readme)
-    assert f"the interaction | | | {contrast('interaction', 'declared')[1]}, declared and tested" in answer
-    for name, detected in (("controller", ""), ("input", ", not detected")):
-        sides, gain = contrast(name, "declared")
-        assert f"{gain.removesuffix(')')}{detected}; {' and '.join(sides)} %)" in answer
-
-
 def test_the_first_table_of_goal_reaching_is_that_of_the_runs():
     columns = (("success", 0), ("arm_effort", 1), ("jerkiness", 3), ("base_path", 2), ("length", 0))
     page, readme = plain("docs/results/goal_reaching.md"), plain("README.md")

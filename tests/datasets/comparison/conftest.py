@@ -1,6 +1,7 @@
 """What the tests of comparisons share."""
 
 import pytest
+from canned import canned
 from compare_helpers import quick_and_slow
 
 
@@ -13,6 +14,6 @@ def few_resamples():
 
 
 @pytest.fixture(scope="session")
-def ours(tmp_path_factory):
+def ours():
     """Two datasets that Handrail recorded: one quick, one slow that fails every other time."""
-    return quick_and_slow(tmp_path_factory.mktemp("ours"))
+    return [str(canned(quick_and_slow) / name) for name in ("quick", "slow")]

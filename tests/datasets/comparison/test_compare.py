@@ -167,7 +167,7 @@ WRONG = {
     "no such": (["{quick}", "nowhere"], "nowhere.*expected a folder, found none"),
     "column": (["{quick}", "{slow}", "--by", "colour"], "unknown column 'colour'"),
     "labels": (["{quick}", "{slow}", "--labels", "a"], "--labels: expected 2 names, got 1"),
-    "same name": (["{quick}", "{quick}"], r"two datasets are called 'ours\d+/quick'"),
+    "same name": (["{quick}", "{quick}"], r"two datasets are called 'set/quick'"),
     "baseline": (
         ["{quick}", "{slow}", "--baseline", "z"],
         "unknown baseline 'z': expected one of quick, slow",

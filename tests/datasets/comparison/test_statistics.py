@@ -190,11 +190,6 @@ GOOD = {"training_seed": 0, "rollouts": [{"seed": 1, "success": True}]}
 WRONG = {
     "format": ({"arms": {"a": [GOOD]}}, "expected the format 'handrail.evaluations/1', got None"),
     "no arms": ({"format": FORMAT, "arms": {}}, "expected 'arms' with one label or more"),
-    "no policies": (
-        {"format": FORMAT, "arms": {"a": []}},
-        "condition 'a': expected a list of length >= 1",
-    ),
-    "no seed": ({"format": FORMAT, "arms": {"a": [{"rollouts": []}]}}, "condition 'a': expected"),
     "no rollouts": (
         {"format": FORMAT, "arms": {"a": [GOOD | {"rollouts": []}]}},
         "condition 'a': expected a list of length >= 1 at .*rollouts",

@@ -5,6 +5,7 @@ import os
 
 import numpy as np
 import pytest
+from canned import copied
 from command_helpers import command
 from compare_helpers import JOINTS, lerobot_dataset, quick_and_slow
 from datasets_helpers import record, tree
@@ -70,13 +71,13 @@ def test_changed_rows_are_noticed(root, same_time):
 
 
 def test_training_and_comparison_notice(tmp_path):
-    roots = quick_and_slow(tmp_path)
+    root = copied(tmp_path / "sets", quick_and_slow)
     output = tmp_path / "report"
-    arguments = (*roots, "--output", output, "--no_pictures")
+    arguments = (root / "quick", root / "slow", "--output", output, "--no_pictures")
     assert command(*arguments, name="compare").returncode == 0
-    config = TrainConfig(dataset=StoredConfig(root=roots[1]), actions="recorded")
+    config = TrainConfig(dataset=StoredConfig(root=str(root / "slow")), actions="recorded")
     assert read_source(config).info.episodes == 12
-    _harm(Layout(tmp_path / "slow").data(4))
+    _harm(Layout(root / "slow").data(4))
     before = tree(output)
     done = command(*arguments, name="compare")
     assert done.returncode == 2

@@ -3,14 +3,9 @@
 import contextlib
 import os
 import resource
-import subprocess
 
-import numpy as np
 import pytest
 from datasets_helpers import (
-    CAMERAS,
-    REPO,
-    ROBOT,
     check_pictures,
     create,
     digest,
@@ -22,10 +17,7 @@ from datasets_helpers import (
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format import video
-from handrail.datasets.format.manifest import Manifest
-from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.repair import repair
-from handrail.datasets.recording.writer import EpisodeWriter
 
 
 @contextlib.contextmanager
@@ -103,41 +95,6 @@ def test_every_moment_of_a_full_disk(tmp_path, monkeypatch):
         monkeypatch.undo()
         assert failures >= 5
         assert writer.num_episodes == 2
-
-
-def _mounted(path) -> bool:
-    path.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(path)]
-    try:
-        return subprocess.run(command, capture_output=True, check=False).returncode == 0
-    except FileNotFoundError:
-        return False
-
-
-def test_a_really_full_disk(tmp_path):
-    disk = tmp_path / "disk"
-    if not _mounted(disk):
-        pytest.skip("mounting a small disk needs root")
-    features = {"observation.state": Feature("float32", (2,)), CAMERAS[0]: Feature("video", (96, 96, 3))}
-    noise = np.random.default_rng(0).integers(0, 255, (96, 96, 3), dtype=np.uint8)
-    try:
-        saved, failed = [], 0
-        with EpisodeWriter.create(disk / "set", Manifest(REPO, 30, ROBOT, features)) as writer:
-            while failed < 3:
-                for _ in range(6):
-                    writer.add_frame({"observation.state": np.zeros(2), CAMERAS[0]: noise}, "fill the disk")
-                try:
-                    saved.append(writer.save_episode())
-                except HandrailError:
-                    failed += 1
-            (disk / "set" / "data").joinpath("chunk-000", "file-000.parquet").stat()
-        assert len(saved) >= 2
-        assert repair(disk / "set").clean
-        dataset = open_with_lerobot(disk / "set")
-        assert dataset.num_episodes == len(saved)
-        assert dataset[len(dataset) - 1][CAMERAS[0]].shape == (3, 96, 96)
-    finally:
-        subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
 @pytest.mark.parametrize("when", ["a picture", "the end"])

@@ -9,8 +9,9 @@ import socket
 
 import pyarrow.parquet as pq
 import pytest
+from canned import canned
 from command_helpers import command
-from datasets_helpers import create, resume, tree
+from datasets_helpers import create, record, resume, tree
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
@@ -92,8 +93,9 @@ def itself(path):
 
 
 @pytest.mark.parametrize("put", [named_pipe, listening, endless, itself])
-def test_what_is_no_regular_file_is_one_line_wherever_it_lies(root, put, tmp_path):
+def test_what_is_no_regular_file_is_one_line_wherever_it_lies(put, tmp_path):
     """Law: whatever file of a dataset it stands for, no command waits for it or reads without end."""
+    root = canned(record, 2, cameras=True)
     before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it hangs"))
     signal.alarm(240)
     try:

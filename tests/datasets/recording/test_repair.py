@@ -73,17 +73,6 @@ def test_summary_files_are_rebuilt_to_the_byte(root, name, content):
     assert repair(root).clean
 
 
-def test_resume_repairs_torn_files_by_itself(root):
-    Layout(root).info.write_bytes(b"{")
-    Layout(root).stats.unlink()
-    Layout(root).tasks.unlink()
-    with resume(root, cameras=True) as writer:
-        assert len(writer.repaired.rebuilt) == 3
-        assert record_one(writer, cameras=True) == 4
-    assert open_with_lerobot(root).num_episodes == 5
-    assert repair(root).clean
-
-
 @pytest.mark.parametrize("stream", range(4), ids=["data", "line", "wrist", "scene"])
 @pytest.mark.parametrize("harm", ["cut", "empty", "gone", "flipped"])
 def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):

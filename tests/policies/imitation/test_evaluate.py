@@ -206,7 +206,6 @@ WRONG = {
     "the same policy": ({}, ("chase", "nan"), "expected each dataset draw and training seed once"),
     "json": ({"json": "no/such/folder/e.json"}, ("chase",), "expected a .json file in an existing folder"),
     "video": ({"video": "film.gif"}, ("chase",), "expected a .mp4 file in an existing folder"),
-    "time": ({"time_limit": -1.0}, ("chase",), "--time_limit: expected a number >= 0"),
 }
 
 

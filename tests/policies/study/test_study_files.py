@@ -10,7 +10,7 @@ from toml_helpers import mutated
 from handrail.controllers.errors import HandrailError
 from handrail.policies.study.load import load_design
 
-QUICK = settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+QUICK = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def one_line_or_a_design(path) -> None:
