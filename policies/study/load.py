@@ -4,7 +4,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -30,7 +29,8 @@ def load_design(name: str) -> StudyDesign:
     if not path.is_file():
         raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])
     content, where = read_toml(path, "study"), f"study {name}"
-    own = {"name": path.stem, "digest": digest_of(content)}
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    own = {"name": path.stem, "digest": hashlib.sha256(text.encode()).hexdigest()[:16]}
     for entry in own.keys() & content.keys():
         raise HandrailError(
             f"{where}: expected no {entry}: it follows from the rest, and from the file's name"
@@ -41,9 +41,3 @@ def load_design(name: str) -> StudyDesign:
     design.check()
     check_jobs(design)
     return design
-
-
-def digest_of(content: Mapping[str, Any]) -> str:
-    """Return a digest of what a design's file says, whatever its order, spaces and comments."""
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]

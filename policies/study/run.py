@@ -20,7 +20,10 @@ from handrail.policies.study.power import plan
 from handrail.policies.study.progress import StudyProgress, note_design
 from handrail.policies.study.work import do
 
-_PRELOAD = ("handrail.policies.study.preload",)
+_PRELOAD = (
+    "handrail.policies.imitation.evaluation.evaluation",
+    "handrail.policies.imitation.training.training",
+)
 Work = Callable[[StudyJob, StudyDesign, Path], None]
 
 

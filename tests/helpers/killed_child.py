@@ -15,7 +15,11 @@ from datasets_guillotine import kill_at
 
 from handrail.scripts.__main__ import main
 
-_PRELOAD = "handrail.policies.study.preload"
+_PRELOAD = [
+    "handrail.collect.execution.preload",
+    "handrail.policies.imitation.evaluation.evaluation",
+    "handrail.policies.imitation.training.training",
+]
 
 
 def killed(folder: Path, change: int, function: Callable[..., object], *arguments: object) -> bool:
@@ -27,7 +31,7 @@ def killed(folder: Path, change: int, function: Callable[..., object], *argument
         function: to call, with its arguments.
     """
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([_PRELOAD])
+    context.set_forkserver_preload(_PRELOAD)
     log = folder.parent / "killed.log"
     process = context.Process(target=_call, args=(str(folder), change, str(log), function, arguments))
     process.start()

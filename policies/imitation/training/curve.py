@@ -28,13 +28,12 @@ class Curve:
 
     def __init__(self, folder: Path, step: int) -> None:
         self._path = folder / NAME
-        self.rows = [row for row in read_curve(folder) if row["step"] <= step]
-        lines = [",".join(COLUMNS), *(_line(row) for row in self.rows)]
+        kept = [_line(row) for row in read_curve(folder) if row["step"] <= step]
+        lines = [",".join(COLUMNS), *kept]
         write_whole(self._path, "".join(f"{line}\r\n" for line in lines).encode())
 
     def add(self, row: Row) -> None:
         """Add a row."""
-        self.rows.append({name: row[name] for name in COLUMNS})
         with open(self._path, "ab") as file:
             file.write(f"{_line(row)}\r\n".encode())
             file.flush()

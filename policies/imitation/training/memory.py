@@ -78,7 +78,12 @@ class MemoryDataset:
         episodes = self.columns["episode_index"][rows]
         first = rows - self.columns["frame_index"][rows]
         last = first + torch.tensor(self.meta.lengths)[episodes] - 1
-        batch = self._pictures_of(self.pictures, indices) if self.pictures else {}
+        batch: dict[str, Any] = {}
+        if self.pictures:
+            samples: list[Any] = [self.pictures[int(index)] for index in indices]
+            names = [name for key in self.meta.camera_keys for name in (key, f"{key}_is_pad")]
+            there = [name for name in names if name in samples[0]]
+            batch = {name: torch.stack([each[name] for each in samples]) for name in there}
         for key, values in self.columns.items():
             if key in self.windows:
                 places = rows[:, None] + torch.tensor(list(self.windows[key]))
@@ -88,11 +93,6 @@ class MemoryDataset:
                 batch[key] = values[rows]
         batch["task"] = [self.tasks[episode] for episode in episodes.tolist()]
         return batch
-
-    def _pictures_of(self, pictures: "LeRobotDataset", indices: Sequence[int]) -> dict[str, Any]:
-        samples: list[Any] = [pictures[int(index)] for index in indices]
-        names = [name for key in self.meta.camera_keys for name in (key, f"{key}_is_pad")]
-        return {name: torch.stack([each[name] for each in samples]) for name in names if name in samples[0]}
 
 
 def pictured(info: DatasetInfo) -> dict[str, Feature]:

@@ -1,7 +1,6 @@
 """From a recorded dataset to what a policy is trained on: chosen episodes, seen through its interface."""
 
 import hashlib
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -192,14 +191,11 @@ def _interpreted(
 
 def _check_one_mode(selection: Selection, said: str) -> None:
     """Check that an intent can be completed when the policy drives: as in its mode, and there is but one."""
-    modes = Counter(str(row.get("mode") or "") for row in selection.rows)
-    if len(modes) == 1 and modes.keys() <= {*MODES, said} - {""}:
-        return
-    found = ", ".join(f"{mode or 'no mode'} ({count})" for mode, count in modes.most_common())
-    known = next((mode for mode, _ in modes.most_common() if mode in MODES), None)
-    flag = f"--mode {known}" if known else "--actions realised"
-    words = "expected episodes of one teleop mode, whose controller completes the intent"
-    raise HandrailError(f"--actions intent: {words}; got {found}; say {flag}")
+    modes = {str(row.get("mode") or "") for row in selection.rows}
+    if len(modes) > 1 or not modes <= {*MODES, said} - {""}:
+        words = "expected episodes of one teleop mode, whose controller completes the intent"
+        found = ", ".join(sorted(mode or "no mode" for mode in modes))
+        raise HandrailError(f"--actions intent: {words}; got {found}; say --mode, or --actions realised")
 
 
 def _recorded(info: DatasetInfo, selection: Selection, config: TrainConfig) -> tuple[Features, Columns]:

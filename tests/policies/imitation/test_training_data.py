@@ -104,12 +104,12 @@ def test_distances_are_not_taken_for_colours(tmp_path):
 @pytest.mark.parametrize(
     ("modes", "said"),
     [
-        (("ee", "switching", "ee"), r"got ee \(2\), switching \(1\); say --mode ee$"),
-        (("mask:01", "mask:01", "mask:01"), r"got mask:01 \(3\); say --actions realised$"),
-        (("", "", ""), r"got no mode \(3\); say --actions realised$"),
+        (("ee", "switching", "ee"), "got ee, switching;"),
+        (("mask:01", "mask:01", "mask:01"), "got mask:01;"),
+        (("", "", ""), "got no mode;"),
     ],
 )
-def test_an_intent_of_several_modes_is_refused_with_the_flag(modes, said, tmp_path):
+def test_an_intent_of_several_modes_is_refused(modes, said, tmp_path):
     """No one controller could complete it when the policy drives."""
     config = {"root": canned(write_dataset, modes=modes), "output": tmp_path / "policy", "actions": "intent"}
     refused(tiny(**config), f"--actions intent: expected episodes of one teleop mode.*{said}")
