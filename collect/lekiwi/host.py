@@ -8,7 +8,7 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
@@ -22,6 +22,7 @@ from handrail.controllers.robot.model import load_model
 from handrail.datasets.storage.strict_json import write_json
 
 _FPS = 60  # of the simulation [Hz]
+_PERIOD = 1.0 / 30.0  # of a round, as LeRobot's host has it [s]
 
 
 class HostSockets:
@@ -70,8 +71,8 @@ class HostSockets:
         self._context.term()
 
 
-def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
-    """Run the host until its time is over or Ctrl-C; return the exit code."""
+def serve(config: HostConfig, say: Callable[[str], None] = print) -> NoReturn:
+    """Run the host until Ctrl-C."""
     model = load_model(config.robot)
     units = robot_units("lekiwi", model.description)
     task = resolved(TASKS.find(config.task).task)()
@@ -84,7 +85,11 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
         f"observations :{config.port_zmq_observations}; Ctrl-C ends it"
     )
     try:
-        _run(loop, sockets, config)
+        while True:
+            now = time.monotonic()
+            if parts := loop.tick(now, sockets.receive(), time.time()):
+                sockets.send(parts)
+            time.sleep(max(_PERIOD - (time.monotonic() - now), 0.0))
     finally:
         sockets.close()
         body.close()
@@ -93,16 +98,6 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
         if config.json:
             write_json(Path(config.json).expanduser(), summary)
         say(json.dumps({name: value for name, value in summary.items() if name != "episodes"}))
-    return 0
-
-
-def _run(loop: LeKiwiLoop, sockets: HostSockets, config: HostConfig) -> None:
-    period, start = 1.0 / config.max_loop_freq_hz, time.monotonic()
-    while not config.seconds or time.monotonic() - start < config.seconds:
-        now = time.monotonic()
-        if parts := loop.tick(now, sockets.receive(), time.time()):
-            sockets.send(parts)
-        time.sleep(max(period - (time.monotonic() - now), 0.0))
 
 
 def import_zmq(wanted_by: str) -> Any:

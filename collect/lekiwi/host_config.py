@@ -35,20 +35,12 @@ class HostConfig:
     """Where observations leave."""
     cameras: Names = ""
     """What it sees: front, wrist or both; none by default (needs OpenGL)."""
-    camera_fps: Advanced[Annotated[float, Meta(ge=0.1, le=60)]] = 10.0
-    """New pictures a second; in between it sends the last one again."""
-    watchdog_timeout_ms: Advanced[Annotated[float, Meta(ge=50, le=10000)]] = 500.0
-    """Without a command for so long, the base stops."""
-    max_loop_freq_hz: Advanced[Annotated[float, Meta(ge=5, le=60)]] = 30.0
-    """Rounds a second."""
     latency: Advanced[Annotated[float, Meta(ge=0, le=2)]] = 0.0
     """How late commands and observations arrive, each [s]."""
     drop: Advanced[Annotated[float, Meta(ge=0, le=1)]] = 0.0
     """Share of the messages that get lost, 0 to 1."""
     lost_camera: Advanced[str] = ""
     """A camera that says nothing."""
-    seconds: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
-    """How long it runs; until Ctrl-C when 0."""
     json: Advanced[str] = ""
     """Write what it saw to this file at the end: commands, ages, stops, episodes."""
 

@@ -13,6 +13,8 @@ from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.processor.units import number
 
 EPISODE, SEED, SENT = "handrail.episode", "handrail.seed", "handrail.sent"  # a real host overlooks these
+_WATCHDOG = 0.5  # without a command for so long the base stops, as LeRobot's host has it [s]
+_PICTURES = 0.1  # from one to the next; in between it sends the last one again [s]
 _QUALITY = 90  # of the JPEGs, as LeRobot's host has it
 
 
@@ -89,7 +91,7 @@ class LeKiwiLoop:
             self._commands.put(message, now)
         if (message := self._commands.newest(now)) is not None:
             self._take(message, now, wall)
-        if now - self._heard > self._config.watchdog_timeout_ms / 1000.0 and not self._stopped:
+        if now - self._heard > _WATCHDOG and not self._stopped:
             self._stopped = True
             self.stops += 1
             self._body.stop_base()
@@ -146,7 +148,7 @@ class LeKiwiLoop:
     def _answer(self, now: float) -> list[bytes]:
         """Return LeKiwi's observation: a header, and a JPEG a camera; of a lost one nothing."""
         cameras = self._config.camera_names
-        if cameras and now - self._painted >= 1.0 / self._config.camera_fps:
+        if cameras and now - self._painted >= _PICTURES:
             self._painted = now
             lost = self._config.lost_camera
             self._pictures = {name: b"" if name == lost else _jpeg(self._body, name) for name in cameras}
