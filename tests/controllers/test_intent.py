@@ -118,18 +118,6 @@ def test_turns_may_be_followed_less_closely_than_the_way():
     assert errors[1][3:].max() > 0.02
 
 
-def test_any_callable_predicts():
-    seen = []
-
-    def predict(now, times):
-        seen.append(times)
-        return np.zeros((len(times), 18))
-
-    _, v, _ = roll(MaskedMpc(MODEL, predict=predict), [asking(np.full(18, 0.3), "ee")] * 5)
-    np.testing.assert_allclose(seen[0], TIMES)
-    np.testing.assert_allclose(v[-1], 0.0, atol=1e-3)
-
-
 def test_a_prediction_of_another_shape_is_refused_before_anything_moves():
     mpc = MaskedMpc(MODEL, predict=lambda now, times: np.zeros((1, 18)))
     with pytest.raises(HandrailError, match=r"expected values of shape \(\d+, 18\), got \(1, 18\)"):

@@ -12,22 +12,71 @@ import unicodedata
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from canned import copied
 from command_helpers import command, ran
+from datasets_helpers import FPS, REPO
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
-from strange_helpers import FORGED, LIVE, PLAIN, STEERING, STRANGE, dataset
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.presentation.markdown import markdown_table, markdown_text
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.printable import printable
+from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.scripts import cli
+
+PLAIN, FORGED = "plain", "saved: all is well"
+STEERING = "\x1b[2J\x1b]0;pwned\x07\x9b1A\x08\x7f\u202egnp\u2066\u200b\u2028"
+LIVE = (
+    "<script>alert(1)</script>",
+    "![x](http://evil.example/p.png)[y](javascript:alert(1))<http://evil.example>",
+    f"a | b\n# heading\n\n{FORGED}\r\n---\n- item\n```",
+    "=HYPERLINK(1)",
+    r'$\frac{$ `code` *x* [bold red] [/] :smile: " onload="x" &lt;b&gt;',
+)
+STRANGE = [word + STEERING for word in LIVE]
+LENGTH, EPISODES = 24, 4
+
+
+def dataset(root, words):
+    """Record a dataset that says some words wherever words can stand."""
+    task, mode, operator, reason, robot = words
+    names = [f"{word}{place}" for place, word in enumerate(words)]
+    features = {
+        "observation.state": Feature("float32", (5,), tuple(names)),
+        "observation.environment_state": Feature("float32", (5,), tuple(reversed(names))),
+        "action": Feature("float32", (5,), tuple(names)),
+        "teleop.values": Feature("float32", (5,), tuple(names)),
+        "teleop.mask": Feature("bool", (5,), tuple(names)),
+        "teleop.mode": Feature("string"),
+        "teleop.device": Feature("string"),
+        "controller.smallest_distance": Feature("float32"),
+    }
+    rng = np.random.default_rng(0)
+    with EpisodeWriter.create(root, Manifest(REPO, FPS, robot, features)) as writer:
+        for episode in range(EPISODES):
+            for index in range(LENGTH + episode):
+                move = np.sin(0.1 * index + np.arange(5)) + 0.01 * rng.normal(size=5)
+                numbers = {key: move.astype(np.float32) for key in list(features)[:4]}
+                said = {"teleop.mode": mode, "teleop.device": "", "controller.smallest_distance": 0.1}
+                writer.add_frame(numbers | said | {"teleop.mask": np.ones(5, bool)}, f"{task}{episode % 2}")
+            texts = {"mode": mode, "operator": operator, "robot": robot, "robot_client": robot}
+            texts["environment"] = f"{task}{episode % 2}"
+            texts["settings"] = json.dumps({"task": task, "mode": mode, "robot": robot})
+            texts |= {words[place].replace("/", ""): words[0] for place in (0, 2)}  # columns of a stranger's
+            ended = {"success": episode % 2 == 0, "failure_reason": reason * (episode % 2), "seed": 1}
+            writer.save_episode(ended | texts)
+    (root / f"{words[3]}.txt".replace("/", "")[:80]).write_text("x")
+    (root / "data" / f"{words[1]}".replace("/", "")[:80]).write_text("x")
+    return root
 
 
 def plain_and_strange(folder):
@@ -245,13 +294,3 @@ def test_the_cockpit_s_page_sets_words_as_text():
     live = re.compile(r"(inner|outer)HTML|insertAdjacentHTML|document\.write|srcdoc|createContextualFragment")
     assert [path.name for path in page.glob("*.js") if live.search(path.read_text())] == []
     assert len(list(page.glob("*.js"))) > 20
-
-
-def test_an_error_of_a_command_is_one_line(capsys):
-    def body():
-        raise HandrailError(f"task {STRANGE[2]}: expected another")
-
-    with pytest.raises(SystemExit) as stop:
-        cli.run(body)
-    assert stop.value.code == cli.BAD_INPUT
-    assert capsys.readouterr().err.count("\n") == 1
