@@ -24,6 +24,7 @@ from handrail.scripts.bench.latency.clients import DrivingPage, Spectator
 from handrail.scripts.bench.report import ReportConfig, machine, report, spread
 
 FPS = 20  # [Hz]
+_QUICK, _SLOW = 4, 20  # pages that watch, and under load those that take things slowly
 _SLOW_PAUSE = 0.2  # of a page that takes things slowly [s]
 _LATENCIES = {
     "key to command": "key to commanded velocity",
@@ -46,12 +47,8 @@ class LatencyConfig(ReportConfig):
 
     seconds: Annotated[int, Meta(ge=5)] = 30
     """How long each case is driven [s]."""
-    spectators: Annotated[int, Meta(ge=0, le=30)] = 4
-    """Pages that watch."""
     overload: bool = True
     """Also measure with a busy program on every core, and pages that take what they are sent slowly."""
-    slow_spectators: Annotated[int, Meta(ge=0, le=30)] = 20
-    """How many of these."""
     browser: str = ""
     """Also measure with a browser that watches: where Chromium is, such as /usr/bin/chromium."""
     image_size: Count = 320
@@ -62,8 +59,6 @@ class LatencyConfig(ReportConfig):
     def check(self) -> None:
         """Check the settings."""
         super().check()
-        if self.spectators + self.slow_spectators > 30:
-            raise HandrailError("--spectators and --slow_spectators: expected at most 30 together")
         if self.browser and not os.access(self.browser, os.X_OK):
             raise HandrailError(f"--browser {self.browser}: expected a program, such as /usr/bin/chromium")
 
@@ -111,7 +106,7 @@ def measure(config: LatencyConfig) -> dict[str, Any]:
     if config.browser:
         cases["a browser watches too"] = (0, 0, config.browser)
     if config.overload:
-        cases["overload"] = (config.slow_spectators, os.cpu_count() or 1, "")
+        cases["overload"] = (_SLOW, os.cpu_count() or 1, "")
     load, rng, found = os.getloadavg()[0], np.random.default_rng(config.seed), {}
     with tempfile.TemporaryDirectory(prefix="handrail-latency-") as folder:
         root = Path(folder) / "dataset"
@@ -119,7 +114,7 @@ def measure(config: LatencyConfig) -> dict[str, Any]:
             page = DrivingPage(address)
             for name, (slow, burners, browser) in cases.items():
                 page.until(lambda frame: frame["phase"] == "ready")
-                with busy(burners), _watching(config.spectators, slow, browser, address) as spectators:
+                with busy(burners), _watching(slow, browser, address) as spectators:
                     page.ask("start")
                     page.until(lambda frame: frame["phase"] == "driving")
                     found[name] = _drive(page, spectators, config.seconds, rng, process.pid)
@@ -165,7 +160,7 @@ def _drive(
     took = time.monotonic() - start
     shares = {name: (seconds - spent.get(name, 0.0)) / took for name, seconds in _spent(process).items()}
     counts = np.subtract([(each.frames, each.pictures) for each in watching], counts)
-    frames, pictures = np.mean(counts, axis=0) / took if watching else (0.0, 0.0)
+    frames, pictures = np.mean(counts, axis=0) / took
     return {
         "latencies_ms": {name: _spread(times) for name, times in page.times.items() if times},
         "driver_frames_hz": page.frames / took,
@@ -186,9 +181,9 @@ def _program(words: str) -> str:
 
 
 @contextlib.contextmanager
-def _watching(quick: int, slow: int, browser: str, address: str) -> Iterator[list[Spectator]]:
+def _watching(slow: int, browser: str, address: str) -> Iterator[list[Spectator]]:
     """Let pages watch; give those that take what they are sent at once."""
-    pages = [Spectator(address, f"page-that-watches-{n}") for n in range(quick)]
+    pages = [Spectator(address, f"page-that-watches-{n}") for n in range(_QUICK)]
     late = [Spectator(address, f"page-that-is-slow-{n}", _SLOW_PAUSE) for n in range(slow)]
     try:
         with _browser(browser, address):
