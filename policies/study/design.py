@@ -133,11 +133,6 @@ class Robustness:
     rollouts: Count = 50
     draws: _Draws = 1
 
-    def protections_of(self, actions: str) -> tuple[str, ...]:
-        """Return what else stands between robot and policies of some actions."""
-        unprotected = actions == "intent"
-        return tuple(each for each in self.protections if (each == "none") == unprotected)
-
 
 @dataclass(frozen=True)
 class StudyDesign:

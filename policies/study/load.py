@@ -18,16 +18,12 @@ from handrail.policies.study.settings import check_jobs
 PRESETS = Path(__file__).parent / "presets"
 
 
-def design_names() -> list[str]:
-    """Return the studies that come with Handrail."""
-    return sorted(path.stem for path in PRESETS.glob("*.toml"))
-
-
 def load_design(name: str) -> StudyDesign:
     """Return a study by the name of a preset or the path of a TOML file."""
     path = Path(name).expanduser() if name.endswith(".toml") else PRESETS / f"{name}.toml"
     if not path.is_file():
-        raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])
+        known = sorted(each.stem for each in PRESETS.glob("*.toml"))
+        raise unknown_name("study", name, [*known, "a file that ends in .toml"])
     content, where = read_toml(path, "study"), f"study {name}"
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     own = {"name": path.stem, "digest": hashlib.sha256(text.encode()).hexdigest()[:16]}

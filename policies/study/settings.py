@@ -89,7 +89,8 @@ def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> d
         common["episodes"] = min(design.rollouts, more.rollouts)
         if more.perturbations:
             found["disturbed"] = EvaluateConfig(perturbation=",".join(more.perturbations), **common)
-        if protections := more.protections_of(policy.actions):
+        is_intent = policy.actions == "intent"
+        if protections := [each for each in more.protections if (each == "none") == is_intent]:
             found["protected"] = EvaluateConfig(protection=",".join(protections), **common)
     return found
 

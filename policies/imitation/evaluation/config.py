@@ -64,11 +64,6 @@ class EvaluateConfig(ExecutionConfig):
         return tuple(Path(folder).expanduser() for folder in given)
 
     @property
-    def file(self) -> Path:
-        """Where the rollouts are written."""
-        return Path(self.json).expanduser()
-
-    @property
     def protections(self) -> tuple[str, ...]:
         """The protections asked for."""
         return names(self.protection, PROTECTIONS)

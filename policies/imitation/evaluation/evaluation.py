@@ -55,8 +55,7 @@ def evaluate(
     """
     config.check()
     conditions, refused = policy_conditions(config)
-    file = EvaluationFile(config.file if config.json else None)
-    file.open(conditions)
+    file = EvaluationFile(Path(config.json).expanduser() if config.json else None, conditions)
     asked = {
         f"{each.label} of {each.checkpoint.folder}, seed {seed}": (each, seed)
         for each in conditions

@@ -36,9 +36,10 @@ class EvaluationFile:
 
     Args:
         path: of the file; None keeps everything in memory.
+        conditions: to be run; they must fit what is there.
     """
 
-    def __init__(self, path: Path | None) -> None:
+    def __init__(self, path: Path | None, conditions: Sequence[PolicyCondition]) -> None:
         self._path = path
         self.content: dict[str, Any] = {"format": FORMAT, "conditions": {}, "arms": {}}
         if path is not None and path.exists():
@@ -46,9 +47,6 @@ class EvaluationFile:
             self.content |= read_json(path)
             if not isinstance(self.content["conditions"], dict):
                 raise HandrailError(f"--json {path}: expected conditions by label, got others")
-
-    def open(self, conditions: Sequence[PolicyCondition]) -> None:
-        """Check that conditions fit what is there."""
         task = self.content.setdefault("task", conditions[0].checkpoint.meta.environment)
         for condition in conditions:
             label, checkpoint, entry = condition.label, condition.checkpoint, self._entry(condition)

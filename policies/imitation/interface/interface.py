@@ -20,12 +20,12 @@ from handrail.controllers.typed import Text
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.relative import (
     BASE_SEEN,
+    SEEN,
     TOOL,
     TOOL_SEEN,
     RobotPose,
     rotations,
     seen,
-    seen_names,
 )
 
 Columns = Mapping[str, np.ndarray]
@@ -92,7 +92,7 @@ class PolicyInterface:
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of what the policy reads: state, environment."""
         base = BASE_SEEN if self._shows_base else ()
-        around = (f"{name}.{part}" for name, parts, _ in self._objects for part in seen_names(parts))
+        around = (f"{name}.{part}" for name, parts, _ in self._objects for part in SEEN.get(parts, parts))
         return (*self._own, *TOOL_SEEN, *base), tuple(around)
 
     @property

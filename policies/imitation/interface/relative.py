@@ -34,7 +34,8 @@ _POSE = (*_POSITION, "qw", "qx", "qy", "qz")
 _NEAR = (0.05, 0.25)  # r: from where on being near is told finely [m]
 _OFFSET = ("dx", "dy", "dz", *(f"near_{r:g}.{axis}" for r in _NEAR for axis in _POSITION))
 _MATRIX = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
-_SEEN = {_POSE: (*_OFFSET, *_MATRIX), _POSITION: _OFFSET}
+SEEN = {_POSE: (*_OFFSET, *_MATRIX), _POSITION: _OFFSET}
+"""The names of what a policy reads of an object, by those of its numbers; of other numbers as they are."""
 TOOL = tuple(f"tool.{part}" for part in _POSE)
 """The tool's pose, as recorded."""
 TOOL_SEEN = tuple(f"tool.{part}" for part in (*_POSITION, *_MATRIX))
@@ -81,11 +82,6 @@ class RobotPose:
         return np.column_stack([self.base[:, :2], np.cos(yaw), np.sin(yaw)])
 
 
-def seen_names(parts: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of what a policy reads of an object's numbers."""
-    return _SEEN.get(parts, parts)
-
-
 def seen(parts: tuple[str, ...], numbers: FloatArray, pose: RobotPose) -> FloatArray:
     """Return an object as seen from the robot, (T, k).
 
@@ -94,7 +90,7 @@ def seen(parts: tuple[str, ...], numbers: FloatArray, pose: RobotPose) -> FloatA
         numbers: as recorded, (T, p).
         pose: of the robot.
     """
-    if parts in _SEEN:
+    if parts in SEEN:
         offset = pose.turned(numbers[:, :3] - pose.tool)
         square = np.sum(offset**2, axis=1, keepdims=True)
         found = [offset, *(offset / np.sqrt(square + r * r) for r in _NEAR)]
