@@ -124,7 +124,9 @@ class ShapePairs:
         ]
 
     def _take_joints(self) -> None:
-        memory = self.memory
+        memory, limits = self.memory, self._model.description.limits
+        memory.lower[:], memory.upper[:] = limits.position_lower, limits.position_upper
+        memory.a_max[:] = limits.acceleration
         for index, joint in enumerate(joints_of(self._model)):
             memory.parent[index], memory.slides[index] = joint.parent, joint.prismatic
             memory.joint_rotation[index] = joint.rotation.ravel()

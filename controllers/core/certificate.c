@@ -9,10 +9,9 @@
 #define BEYOND 0.01     /* of its range that a joint may come to rest [m, rad] */
 #define SAMPLES 4       /* of a stop, and of the waiting after it */
 
-/* Along a path, (count, 2): distances are measured where they can come below the least, (P). */
-void path_violations(Scene *s, int64_t count, const double *path, const double *times, const double *start,
-                     const double *now, const double *least, const double *lower, const double *upper,
-                     double *violations) {
+/* Along a path, (count, 2): distances are measured where they can come below the least. */
+void path_violations(Scene *s, int64_t count, const double *path, const double *times, double *violations) {
+  const double *least = s->least, *start = s->start, *now = s->start_distances, *lower = s->lower, *upper = s->upper;
   for (int64_t k = 0; k < count; k++) {
     const double *q = path + k * s->n;
     double hard = 0.0, all = 0.0;
@@ -34,9 +33,8 @@ void path_violations(Scene *s, int64_t count, const double *path, const double *
 
 /* Of the full stop from (q, v):  q_j(t) = q_j + v_j t - 1/2 sign(v_j) a_j t^2  until |v_j| / a_j, after a delay; and,
    where there are movers, of waiting until the span is over. A lag is added to all configurations once more. */
-void stop_violation(Scene *s, const double *q, const double *v, double delay, double span, const double *lag,
-                    const double *start, const double *now, const double *least, const double *lower,
-                    const double *upper, const double *a_max, double *violation) {
+void stop_violation(Scene *s, double delay, double span, const double *lag) {
+  const double *q = s->stop_q, *v = s->stop_v, *a_max = s->a_max;
   double path[2 * SAMPLES * MOST_COORDINATES], times[2 * SAMPLES], found[4 * SAMPLES], longest = 0.0;
   int64_t n = s->n, count = SAMPLES;
   int moving = 0;
@@ -58,10 +56,10 @@ void stop_violation(Scene *s, const double *q, const double *v, double delay, do
     }
     count = 2 * SAMPLES;
   }
-  violation[0] = violation[1] = 0.0;
+  s->violation[0] = s->violation[1] = 0.0;
   for (int lagging = 0; lagging <= (lag ? 1 : 0); lagging++) {
     for (int64_t i = 0; lagging && i < count * n; i++) path[i] += lag[i % n];
-    path_violations(s, count, path, times, start, now, least, lower, upper, found);
-    for (int64_t i = 0; i < 2 * count; i++) violation[i % 2] = larger_or_nan(violation[i % 2], found[i]);
+    path_violations(s, count, path, times, found);
+    for (int64_t i = 0; i < 2 * count; i++) s->violation[i % 2] = larger_or_nan(s->violation[i % 2], found[i]);
   }
 }

@@ -34,6 +34,9 @@ typedef struct {
   double *moves;             /* (P, n) -1, 1: moves the first, the second alone; 0: none or both */
   double *bounds;            /* (n, P) way of a pair by a unit of a coordinate, at most */
   double *speed;             /* (P,) of a mover */
+  double *lower;             /* (n,) range of the joints */
+  double *upper;             /* (n,) */
+  double *a_max;             /* (n,) */
   int64_t *slack;            /* (P,) own, standing or moving */
   int64_t changes;           /* of the scene so far */
   double *now_q;             /* (n,) configuration measured last at time 0, */
@@ -47,6 +50,12 @@ typedef struct {
   double *placed_position;   /* (S, 3) */
   double *bound;             /* (P,) */
   double *here;              /* (P,) */
+  double *least;             /* (P,) distances that a motion has to keep, */
+  double *start;             /* (n,) from here, */
+  double *start_distances;   /* (P,) where they are these */
+  double *stop_q;            /* (n,) where a full stop begins, */
+  double *stop_v;            /* (n,) how fast */
+  double *violation;         /* (2,) how far that falls short of safety */
   int (*measure)(int64_t pair, const double *placements, double *witness); /* of cores that meet; 0: measured */
 } Scene;
 
@@ -148,12 +157,8 @@ void scene_values(Scene *scene, int64_t count, const double *q, const double *ti
                   const double *now, const double *within, double *values);
 
 /* certificate.c */
-void path_violations(Scene *scene, int64_t count, const double *path, const double *times, const double *start,
-                     const double *now, const double *least, const double *lower, const double *upper,
-                     double *violations);
-void stop_violation(Scene *scene, const double *q, const double *v, double delay, double span, const double *lag,
-                    const double *start, const double *now, const double *least, const double *lower,
-                    const double *upper, const double *a_max, double *violation);
+void path_violations(Scene *scene, int64_t count, const double *path, const double *times, double *violations);
+void stop_violation(Scene *scene, double delay, double span, const double *lag);
 
 /* trajectory.c */
 void interpolate(const double *velocities, int64_t count, int64_t n, const double *knots, int64_t number, double *out);

@@ -128,11 +128,12 @@ def resumed(commanded: FloatArray, measured: FloatArray, tolerance: FloatArray) 
 
 
 def _asked(reference: FloatArray, predicted: FloatArray, mask: BoolArray, largest: FloatArray) -> FloatArray:
-    """Return a reference whose first columns are the predicted values within ± largest, 0 where masked out.
+    """Return a reference whose first columns are the masked predicted values within ± largest, 0 elsewhere.
 
     NaN stays NaN: the solver then fails, and the robot brakes.
     """
     result = reference.copy()
-    bounded = np.minimum(np.maximum(predicted, -largest), largest)
-    result[:, : len(mask)] = np.where(mask, bounded, 0.0)
+    asked = result[:, : len(mask)]
+    np.maximum(predicted, -largest, out=asked, where=mask)
+    np.minimum(asked, largest, out=asked)
     return result

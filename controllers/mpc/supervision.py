@@ -85,7 +85,7 @@ class Supervisor:
     def _backup(self, loop: LoopState, lag: FloatArray | None) -> Backup:
         settings = self.settings
         least, span = settings.margin_share * loop.surroundings.margins, settings.horizon * settings.dt
-        certificate = StopCertificate(self.limiter, loop.surroundings.collision, least, span, lag)
+        certificate = StopCertificate(loop.surroundings.collision, least, span, lag)
         return Backup(certificate, self.limiter, settings.dt)
 
     def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:

@@ -1,11 +1,10 @@
 """The masked optimal control problem of one update (the paper's equation 6), as a value."""
 
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, IntArray, frozen
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.ocp.motion import rollout
 from handrail.controllers.robot.parts import Limits
@@ -49,9 +48,8 @@ class Problem(NamedTuple):
         return rollout(self.q, self.v, self.dt, u)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """A solution: trajectories, slack, and how the solver fared."""
+class Plan(NamedTuple):
+    """A solution: trajectories, slack, and how the solver fared. Its arrays are read-only."""
 
     q: FloatArray  # positions at the nodes, (N + 1, n)
     v: FloatArray  # velocities at the nodes, (N + 1, n)
@@ -64,14 +62,9 @@ class Plan:
     solved: bool  # whether the solver reports a solution
     iterations: int  # of the solver
     rows: int = 0  # inequality rows of the last QP, bounds left out
-    active: IntArray = field(default_factory=lambda: np.empty(0, dtype=int))
+    active: IntArray = np.empty(0, dtype=int)
     """Names of those that hold with equality, for the next problem among the same pairs."""
     phases: tuple[tuple[str, float], ...] = ()  # where the time went: `residuals`, `distances`, `solve` [s]
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only copies."""
-        for name in ("q", "v", "u", "distances"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""

@@ -6,8 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.core.library import functions
-from handrail.controllers.safety.limiter import Limiter
+from handrail.controllers.core.library import Memory, functions
 
 _WAITING = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a robot waits after it has stopped
 
@@ -28,8 +27,7 @@ class StopCertificate(NamedTuple):
     is beyond already, no farther than now.
     """
 
-    limiter: Limiter  # knows the limits and the full stop
-    collision: CollisionModel  # the pairs
+    collision: CollisionModel  # the pairs, and the limits of the robot
     least: FloatArray  # distance of each pair that is kept, (P,) [m]
     span: float  # time for which the robot has to be safe, where obstacles move [s]
     lag: FloatArray | None = None
@@ -48,13 +46,11 @@ class StopCertificate(NamedTuple):
             now: the position now, (n,), and its distances, (P,).
             delay: time until it begins [s].
         """
-        found, limiter = np.empty(2), self.limiter
-        bounds = limiter.lower, limiter.upper, limiter.acceleration
-        functions().stop_violation(
-            self.collision.memory, q, v, delay, self.span, self.lag, *now, self.least, *bounds, found
-        )
+        memory = self._facing(now)
+        memory.stop_q[:], memory.stop_v[:] = q, v
+        functions().stop_violation(memory, delay, self.span, self.lag)
         self.collision.check()
-        return Violation(*found.tolist())
+        return Violation(*memory.violation.tolist())
 
     def until_rest(
         self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]
@@ -73,10 +69,13 @@ class StopCertificate(NamedTuple):
         """Return the same at every point of a motion, hard and of all, (K, 2)."""
         if self.lag is not None:
             path, times = np.vstack([path, path + self.lag]), np.tile(times, 2)
-        found, bounds = np.empty((len(path), 2)), (self.limiter.lower, self.limiter.upper)
-        path = np.ascontiguousarray(path)
-        functions().path_violations(
-            self.collision.memory, len(path), path, times, *now, self.least, *bounds, found
-        )
+        path, found = np.ascontiguousarray(path), np.empty((len(path), 2))
+        functions().path_violations(self._facing(now), len(path), path, times, found)
         self.collision.check()
         return found if self.lag is None else np.maximum(*np.split(found, 2))
+
+    def _facing(self, now: tuple[FloatArray, FloatArray]) -> Memory:
+        """Return the compiled core's scene, in which motions begin here and have to keep these distances."""
+        memory = self.collision.memory
+        memory.least[:], (memory.start[:], memory.start_distances[:]) = self.least, now
+        return memory

@@ -24,8 +24,7 @@ class Limiter:
 
     def __init__(self, description: RobotDescription) -> None:
         self.limits = limits = description.limits
-        bounds = limits.position_lower, limits.position_upper, limits.acceleration
-        self.lower, self.upper, self.acceleration = map(Pointer, bounds)  # for the compiled core
+        self._acceleration = Pointer(limits.acceleration)  # for the compiled core
 
     def limit(
         self, previous: FloatArray, target: FloatArray, duration: float, q: FloatArray | None = None
@@ -55,13 +54,13 @@ class Limiter:
     def to_rest(self, velocities: FloatArray, dt: float) -> FloatArray:
         """Return velocities at knots, (k, n), and the fastest stop from the last one."""
         count, n = len(velocities), len(self.limits.velocity)
-        last = np.ascontiguousarray(velocities[-1], dtype=np.float64)
+        last = np.array(velocities[-1], dtype=np.float64)
         if last.shape != (n,):
             raise HandrailError(f"velocity to stop from: expected {n} numbers, got shape {last.shape}")
         room, needed = -1, _USUAL_STOP
         while needed > room:
             room, result = needed, np.empty((count + needed, n))
-            needed = functions().stop_velocities(last, n, self.acceleration, dt, room, result[count:])
+            needed = functions().stop_velocities(last, n, self._acceleration, dt, room, result[count:])
         if needed < 0:
             raise HandrailError(f"velocity to stop from: expected finite numbers, got {last.tolist()}")
         result[:count] = velocities

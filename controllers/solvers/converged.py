@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.collision.slacks import LIMITS, SLACKS
 from handrail.controllers.core.library import constant
 from handrail.controllers.errors import HandrailError, message_of
@@ -113,12 +113,12 @@ class ConvergedSolver:
                 break
         q, v = problem.rollout(here.u)
         return Plan(
-            q=q,
-            v=v,
-            u=here.u,
+            q=frozen(q),
+            v=frozen(v),
+            u=frozen(here.u),
             collision_slack=float(here.exact.slack[:LIMITS].max()),
             limit_slack=float(here.exact.slack[LIMITS]),
-            distances=problem.collision.values(problem.q[None])[0],
+            distances=frozen(problem.collision.values(problem.q[None])[0]),
             solved=done,
             iterations=total,
             rows=len(here.near),

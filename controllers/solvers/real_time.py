@@ -6,7 +6,7 @@ grows linearly with the horizon.
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.slacks import LIMITS, SLACKS
 from handrail.controllers.core.library import Memory, functions
@@ -53,12 +53,12 @@ class RealTimeSolver:
         problem.collision.check()
         slacks = core.slacks.tolist()
         return Plan(
-            q=core.path,
-            v=core.speeds,
-            u=core.u,
+            q=frozen(core.path),
+            v=frozen(core.speeds),
+            u=frozen(core.u),
             collision_slack=max(slacks[:LIMITS]),
             limit_slack=slacks[LIMITS],
-            distances=core.distances,
+            distances=frozen(core.distances),
             solved=bool(core.fields.solved),
             iterations=core.fields.changes,
             rows=core.fields.rows,

@@ -36,7 +36,7 @@ def reckless(joint):
         speeds = np.minimum(problem.v[joint] + ahead, LIMITS.velocity[joint])
         u = np.outer(np.diff(speeds, prepend=problem.v[joint]) / problem.dt, np.arange(9) == joint)
         q, v = problem.rollout(u)
-        return replace(HONEST(problem, guess), q=q, v=v, u=u)
+        return HONEST(problem, guess)._replace(q=q, v=v, u=u)
 
     return solve
 
@@ -49,12 +49,12 @@ def raises(error):
 
 
 def unsolved(problem, guess, *active):
-    return replace(HONEST(problem, guess), solved=False)
+    return HONEST(problem, guess)._replace(solved=False)
 
 
 def not_a_number(problem, guess, *active):
     plan = HONEST(problem, guess)
-    return replace(plan, u=plan.u * np.nan, v=plan.v * np.nan, q=plan.q * np.nan)
+    return plan._replace(u=plan.u * np.nan, v=plan.v * np.nan, q=plan.q * np.nan)
 
 
 FAILURES = [raises(HandrailError("no")), raises(RuntimeError("no")), unsolved, not_a_number]

@@ -8,7 +8,6 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.safety.certificate import StopCertificate
-from handrail.controllers.safety.limiter import Limiter
 
 FRONT = HOME[0] + 0.48  # of the chassis [m]
 FORWARD = np.eye(MODEL.size)[0]
@@ -18,7 +17,7 @@ def violation_of(v, obstacle):
     """Return what a full stop from home violates."""
     collision = CollisionModel(MODEL, (obstacle,))
     least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
-    certificate = StopCertificate(Limiter(MODEL.description), collision, least, span=1.0)
+    certificate = StopCertificate(collision, least, span=1.0)
     return certificate.violation(HOME, v, (HOME, collision.values(HOME[None])[0]))
 
 

@@ -1,7 +1,5 @@
 """The masked MPC's laws."""
 
-from dataclasses import replace
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -99,7 +97,7 @@ def test_a_failed_solve_brakes(monkeypatch):
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
     solve = MPC.solver.solve
-    monkeypatch.setattr(MPC.solver, "solve", lambda *given: replace(solve(*given), solved=False))
+    monkeypatch.setattr(MPC.solver, "solve", lambda *given: solve(*given)._replace(solved=False))
     beyond = asking(np.full(18, -2.0), "ee")
     command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
     assert command.diagnostics.status is Status.SOLVER_FAILED
@@ -207,9 +205,9 @@ def test_a_plan_knows_whether_it_is_a_solution():
     MPC.update(STILL, asking(np.full(18, 0.2), "ee")(0.0))
     plan = MPC.plan
     assert plan.is_solution(problem)
-    assert not replace(plan, u=plan.u * 50.0).is_solution(problem)
-    assert not replace(plan, q=plan.q + 0.1).is_solution(problem)
-    assert not replace(plan, solved=False).is_solution(problem)
+    assert not plan._replace(u=plan.u * 50.0).is_solution(problem)
+    assert not plan._replace(q=plan.q + 0.1).is_solution(problem)
+    assert not plan._replace(solved=False).is_solution(problem)
 
 
 def test_a_longer_horizon_is_a_setting():
