@@ -12,11 +12,15 @@ from places import ROOT
 from scipy.spatial.transform import Rotation
 
 import handrail.collect  # noqa: F401  (registers the environments)
+from handrail.collect.session.build import session_features
+from handrail.collect.session.recorder import Recorder
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene, SceneObject
 from handrail.collect.world.task import Start
 from handrail.controllers.robot.model import RobotModel
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.frames import Frame
+from handrail.datasets.recording.writer import EpisodeWriter
 
 UP = np.array([0.0, 0.0, 1.0])
 DOWN = np.diag([1.0, -1.0, -1.0])  # tool pointing at the floor
@@ -40,6 +44,15 @@ def environment(name: str = "PickPlace", **options: Any) -> Iterator[HandrailEnv
         yield env
     finally:
         env.close()
+
+
+@contextmanager
+def recording(root: Path, env: HandrailEnv) -> Iterator[Recorder]:
+    """Record the episodes of a session into a new dataset."""
+    with EpisodeWriter.create(root, Manifest("x/set", 20, "robot", session_features(env))) as writer:
+        recorder = Recorder("reach", {})
+        recorder.writer = writer
+        yield recorder
 
 
 def action(env: HandrailEnv, velocity: Any = 0.0, gripper: float = 0.0) -> np.ndarray:

@@ -33,29 +33,22 @@ def test_the_first_time_it_is_new_and_then_it_goes_on(tmp_path):
     root, config = opened()
     assert root == tmp_path / "outputs" / "cockpit" / "reach"
     assert config.dataset.folder.absolute() == root
+    assert "handrail-inspect outputs/cockpit/reach" in next_commands(root)
     assert opened()[0] == root
+    with open_writer(located(PLAIN, ENV), ENV):  # one that is being written is left alone
+        assert opened()[0].name == "reach-2"
 
 
-def test_one_of_another_rate_or_robot_is_left_alone():
+def test_one_of_another_rate_or_robot_or_no_dataset_is_left_alone(tmp_path):
     first, _ = opened()
     before = {path: path.read_bytes() for path in first.rglob("*") if path.is_file()}
     faster = replace(PLAIN, dataset=FoundDatasetConfig(fps=30))
     assert opened(faster)[0].name == "reach-2"
-    assert opened(replace(PLAIN, robot="ridgeback_panda"))[0].name == "reach-3"
+    (tmp_path / "outputs" / "cockpit" / "reach-3").mkdir()
+    (tmp_path / "outputs" / "cockpit" / "reach-3" / "notes.txt").write_text("mine")
+    assert opened(replace(PLAIN, robot="ridgeback_panda"))[0].name == "reach-4"
     assert opened(faster)[0].name == "reach-2"
     assert {path: path.read_bytes() for path in first.rglob("*") if path.is_file()} == before
-
-
-def test_one_that_is_being_written_is_left_alone():
-    env = build_env(PLAIN, PLAIN.dataset.fps)
-    with open_writer(located(PLAIN, env), env) as writer:
-        assert opened()[0].name == f"{writer.root.name}-2"
-
-
-def test_what_is_no_dataset_is_left_alone(tmp_path):
-    (tmp_path / "outputs" / "cockpit" / "reach").mkdir(parents=True)
-    (tmp_path / "outputs" / "cockpit" / "reach" / "notes.txt").write_text("mine")
-    assert opened()[0].name == "reach-2"
 
 
 def test_a_folder_that_is_said_goes_on_and_is_never_another(tmp_path):
@@ -97,8 +90,3 @@ def test_where_nothing_can_be_written_it_says_so(tmp_path):
     (tmp_path / "outputs").write_text("a file")
     with pytest.raises(HandrailError, match="is a file"):
         opened()
-
-
-def test_what_to_try_next_names_the_folder():
-    root, _ = opened()
-    assert "handrail-inspect outputs/cockpit/reach" in next_commands(root)

@@ -1,7 +1,6 @@
 """The safety fuzz: rude intents in clutter with movers, in physics, without the environment's limiter."""
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,19 +25,13 @@ def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, fail
             with failing(controller, seed, failures):
                 results[seed] = run(model, controller, seed, seconds, movers)
     statuses = sum((result.statuses for result in results.values()), Counter())
-    own = np.quantile([result.nearest_own for result in results.values()], [0, 0.05, 0.5]).round(3)
-    travelled = np.quantile([result.travelled for result in results.values()], [0, 0.5]).round(1)
-    print(f"{robot}, {movers} movers, {len(results)} runs: {dict(statuses)}")
-    print(f"  nearest to itself {own} m (least, 5 %, median), travelled {travelled} m (least, median)")
-    for seed, result in results.items():
-        for contact in result.moving[:1]:
-            print(f"  seed {seed}: a mover met {contact}")
+    travelled = np.median([result.travelled for result in results.values()])
     assert not {seed: r.own for seed, r in results.items() if r.own}
     assert not {seed: r.standing for seed, r in results.items() if r.standing}
     assert max(result.velocity_excess for result in results.values()) < EXCESS
     assert max(result.acceleration_excess for result in results.values()) < EXCESS
     least = 0.3 * seconds * model.description.world.scale
-    assert travelled[1] > least, f"travelled {travelled[1]} m: a robot that freezes is safe too"
+    assert travelled > least, f"travelled {travelled} m: a robot that freezes is safe too"
     return statuses, [seed for seed, result in results.items() if result.moving]
 
 
@@ -59,18 +52,6 @@ def test_rude_intents_in_clutter_with_a_solver_that_fails():
     assert statuses["solver_failed"] > 10
 
 
-class Frozen(MaskedMpc):
-    """Safe, and of no use: it lets the operator move nothing."""
-
-    def update(self, state, intent):
-        return super().update(state, replace(intent, values=np.zeros_like(intent.values)))
-
-
-def test_a_controller_that_freezes_fails():
-    with pytest.raises(AssertionError, match="travelled"):
-        check([1000], 5.0, make=Frozen)
-
-
 def late(robot, gaps, seeds, seconds, horizon=10):
     """Run seeds with so long between two updates; return how far the hand went. Nothing is touched."""
     model, travelled = load_model(robot), {}
@@ -80,14 +61,13 @@ def late(robot, gaps, seeds, seconds, horizon=10):
             runs = {seed: run(model, controller, seed, seconds, gap=gap) for seed in seeds}
             assert not {seed: (r.own, r.standing) for seed, r in runs.items() if r.own or r.standing}, gap
             travelled[gap] = np.median([r.travelled for r in runs.values()])
-    print(f"{robot}, N = {horizon}: the hand went {travelled} m")
     return travelled
 
 
 @pytest.mark.parametrize("robot", robot_names())
 def test_late_updates_touch_nothing(robot):
     """Beyond what was certified the robot is sent the stop that was certified with it."""
-    late(robot, (0.3, 0.5, 1.0), range(1000, 1003), 8.0)
+    late(robot, (0.3, 0.5, 1.0), range(1000, 1003), 5.0)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from collect_helpers import Watcher
+from collect_helpers import Watcher, recording
 
 from handrail.collect.commands.record import record
 from handrail.collect.commands.recording import episode_seed
@@ -18,10 +18,8 @@ from handrail.collect.session.build import (
     build_env,
     build_modes,
     build_session,
-    session_features,
 )
 from handrail.collect.session.outcome import Tally
-from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Session
 from handrail.controllers.baselines.direct import DirectController
@@ -31,12 +29,9 @@ from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
-from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.datasets.recording.writer import EpisodeWriter
 
 SUCCESS, FAILURE, DISCARD, RESTART, QUIT, _, PAUSE = EpisodeEvent
-CONTROLLERS = [lambda model: DirectController(model, 0.05), MaskedMpc]
 
 
 class Person:
@@ -96,7 +91,7 @@ def test_the_operator_ends_an_episode(env, monkeypatch, event, real, success, re
     assert not env.state().commanded.any()
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("controller", [lambda model: DirectController(model, 0.05), MaskedMpc])
 def test_a_pause_brakes_holds_and_goes_on(env, controller):
     """While the robot stands still nothing is recorded and no time passes; nothing jumps."""
     saying = dict.fromkeys(range(20, 120), PAUSE) | {140: SUCCESS}
@@ -132,9 +127,8 @@ def test_a_late_operator_is_braked(env):
 
 @pytest.mark.parametrize("event", [DISCARD, RESTART, QUIT])
 def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
-    with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
-        recorder, person = Recorder("reach", {}), Person(env.model, {9: event}, {5: SUCCESS})
-        recorder.writer = writer
+    with recording(tmp_path / "d", env) as recorder:
+        writer, person = recorder.writer, Person(env.model, {9: event}, {5: SUCCESS})
         session = Session(env, DirectController(env.model, env.period), person, [recorder])
         outcome = session.run(3)
         assert (outcome.kept, outcome.ended_by, outcome.frames) == (False, event, 8)
@@ -149,12 +143,11 @@ def test_a_dataset_of_before_goes_on_with_the_columns_that_it_has(env, tmp_path)
     """Its episodes do not say what the operator said; that is why it failed, in words."""
     old = {"success": True, "failure_reason": "", "seed": 3, "started": 0.0, "wall_time": 1.0}
     old |= dict.fromkeys(("brakes", "late", "undos", "contact_onsets", "contact_periods"), 0)
-    with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
-        recorder, person = Recorder("reach", {}), Person(env.model, *2 * [{5: SUCCESS}])
-        recorder.writer = writer
+    with recording(tmp_path / "d", env) as recorder:
+        person = Person(env.model, *2 * [{5: SUCCESS}])
         session = Session(env, DirectController(env.model, env.period), person, [recorder])
         session.run(3)
-        writer.save_episode(old)
+        recorder.writer.save_episode(old)
         recorder.end(session.run(3))
     rows = read_episodes(tmp_path / "d")
     assert [row["failure_reason"] for row in rows] == ["", "judge: not done"]
@@ -192,23 +185,26 @@ def test_a_first_attempt_has_the_seed_that_it_always_had():
         assert len({episode_seed(seed, episode, attempt) for attempt in range(50)}) == 50
 
 
-def test_a_pause_does_not_make_the_loop_late(env, monkeypatch):
-    """The clock of the pace stands for all periods, held ones too."""
+@pytest.fixture
+def now(monkeypatch):
+    """A clock that goes on only in sleep."""
     now = [0.0]
     monkeypatch.setattr(time, "perf_counter", lambda: now[0])
     monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    return now
+
+
+def test_a_pause_does_not_make_the_loop_late(env, now):
+    """The clock of the pace stands for all periods, held ones too."""
     outcome, _, person = run(env, dict.fromkeys(range(5, 60), PAUSE) | {70: SUCCESS}, realtime=True)
     assert outcome.late == 0
     assert outcome.wall_time == pytest.approx(person.asked * env.period)
     assert outcome.wall_time > outcome.seconds + 1.0
 
 
-def test_a_halt_is_not_caught_up_in_a_rush(env, monkeypatch):
+def test_a_halt_is_not_caught_up_in_a_rush(now):
     """After a long period the beat begins anew: no two periods are shorter than they are."""
-    now, begun = [0.0], []
-    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
-    monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
-    tally = Tally(0, 0.05)
+    begun, tally = [], Tally(0, 0.05)
     for number in range(20):
         begun.append(now[0])
         now[0] += 3.0 if number == 7 else 0.01

@@ -29,17 +29,6 @@ def run(seed=3, **settings):
     return outcome, watcher.frames
 
 
-@pytest.mark.parametrize("mode", ["ee", "switching"])
-def test_pick_and_place_succeeds_without_contact(mode):
-    outcome, moments = run(task="pick_place", mode=mode)
-    assert outcome.success, outcome
-    assert outcome.contact_onsets == 0
-    assert outcome.brakes == 0
-    assert outcome.smallest_distance >= 0.05
-    masks = {frame.intent.mask.tobytes() for frame in moments}
-    assert len(masks) == (2 if mode == "switching" else 1)
-
-
 @pytest.mark.parametrize("mode", sorted(set(MODES) - {"base"}))
 def test_every_mode_reaches(mode):
     """All but base driving, which cannot turn the hand."""
@@ -56,14 +45,6 @@ def test_base_mode_moves_the_base_alone():
     assert moved[:2].max() > 0.1
     assert moved[3:].max() < 0.3  # the arm only keeps clear
     assert outcome.contact_onsets == 0
-
-
-def test_noise_zero_is_smoother():
-    def jerk(noise):
-        _, moments = run(task="reach", mode="ee", seed=7, noise=noise)
-        return np.mean(np.abs(np.diff([frame.action[:9] for frame in moments], n=2, axis=0)))
-
-    assert jerk(0.0) < jerk(1.0)
 
 
 class Unruly:

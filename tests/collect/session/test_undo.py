@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from collect_helpers import recording
 
 from handrail.collect.operators.operator import EpisodeEvent
-from handrail.collect.session.build import session_features
-from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
@@ -15,9 +14,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
-from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.reading.reader import read_frames
-from handrail.datasets.recording.writer import EpisodeWriter
 
 FPS, MODEL = 20, load_model()
 PAUSE, UNDO, SUCCESS = EpisodeEvent.PAUSE, EpisodeEvent.UNDO, EpisodeEvent.SUCCESS
@@ -50,9 +47,7 @@ PLAIN = [(FORTH, 10), (PAUSE, 30), (RIGHT, 8), (SUCCESS, 1)]
 def recorded(root, plan, plant, robot_fps=FPS):
     """Return the frames of an episode, and how it went."""
     env = HandrailEnv(Reach(moving_obstacles=1), MODEL, fps=robot_fps, plant=plant)
-    with EpisodeWriter.create(root, Manifest("x/undo", FPS, "r", session_features(env), {})) as writer:
-        recorder = Recorder("t", {})
-        recorder.writer = writer
+    with recording(root, env) as recorder:
         periods = {"control_period": 1 / FPS, "record_period": 1 / FPS}
         outcome = Session(env, MaskedMpc(MODEL), Person(plan), [recorder], undoes=True, **periods).run(3)
         recorder.end(outcome)
@@ -82,12 +77,9 @@ def test_the_commands_replay_to_the_same_states(tmp_path):
         seen, *_ = env.step(np.asarray(action))
 
 
-def test_without_a_pause_an_undo_goes_to_the_beginning(tmp_path):
+def test_without_a_pause_an_undo_goes_to_the_beginning_and_one_of_nothing_is_none(tmp_path):
     frames, outcome = recorded(tmp_path / "d", [(FORTH, 6), (UNDO, 1), (RIGHT, 4), (SUCCESS, 1)], IdealRobot)
     assert outcome.frames == len(frames["action"]) == 5
     assert set(frames["teleop.undos"]) == {1}
-
-
-def test_an_undo_of_nothing_is_none(tmp_path):
-    _, outcome = recorded(tmp_path / "d", [(UNDO, 3), (RIGHT, 4), (SUCCESS, 1)], IdealRobot)
+    _, outcome = recorded(tmp_path / "e", [(UNDO, 3), (RIGHT, 4), (SUCCESS, 1)], IdealRobot)
     assert outcome.undos == 0
