@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 from canned import copied
-from command_helpers import command
+from command_helpers import command, refused
 from datasets_helpers import create, record
 
 from handrail.controllers.errors import HandrailError
@@ -207,6 +207,4 @@ def test_a_column_of_another_type_is_as_if_missing(tmp_path, name):
 def test_a_newer_format_is_refused_on_reading(root):
     path = Layout(root).manifest
     path.write_text(json.dumps(json.loads(path.read_bytes()) | {"format": 99}))
-    done = command("--dataset.root", root, name="inspect")
-    assert done.returncode == 2
-    assert "a newer Handrail wrote it" in done.stderr
+    refused("--dataset.root", root, name="inspect", told="a newer Handrail wrote it")

@@ -240,6 +240,7 @@ WRONG = {
         ["participant,condition,score,value", "P1,ee,sus,nan"],
         "line 2: value: expected a number >= 0.*, got nan",
     ),
+    "words": (["participant,condition,score,value", "P1,ee,sus,good"], "value: expected a number"),
     "twice": (["participant,condition,score,value", "P1,ee,sus,80", "P1,ee,sus,80"], "P1 ee sus twice"),
     "score": (
         ["participant,condition,score,value", "P1,ee,mood,80"],

@@ -8,7 +8,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
-from command_helpers import command
+from command_helpers import command, ran
 from places import ROOT
 
 from handrail.datasets.presentation.markdown import markdown_table, with_part
@@ -63,8 +63,7 @@ def sets(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded")
     for name, count, seed in (("SET", 3, 0), ("MORE", 1, 9)):
         words = ("--dataset.num_episodes", count, "--seed", seed)
-        done = command(folder / name, *RECORD, *words)
-        assert done.returncode == 0, done.stderr
+        ran(folder / name, *RECORD, *words)
     return {name: folder / name for name in ("SET", "MORE")}
 
 
@@ -74,8 +73,7 @@ def edited(sets: dict[str, Path], whose: str, operation: str, new: Path) -> Path
     for name, place in {**sets, "NEW": new}.items():
         line = line.replace(name, str(place))
     if whose != "lerobot's":
-        done = command(*line.split(), name="edit" if whose == "ours" else operation)
-        assert done.returncode == 0, done.stderr
+        ran(*line.split(), name="edit" if whose == "ours" else operation)
     else:
         if operation in IN_PLACE:
             copied = command("keep", sets["SET"], "--episodes", "0-2", "--output", new, name="edit")
