@@ -6,8 +6,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from handrail.collect.config import SessionConfig
-from handrail.collect.session.build import build_env, build_session
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.drawer import Drawer
@@ -103,15 +101,6 @@ def test_goals_are_inside_its_world_and_within_reach():
         pitch = np.arcsin(-goal.rotation[2, 2])
         assert world.pitch[0] - 1e-9 <= pitch <= world.pitch[1] + 1e-9
         assert body_configuration(MODEL, HOME, goal)[1] < 1e-3
-
-
-def test_a_scripted_operator_steers_only_the_hand_to_a_goal():
-    config = SessionConfig(task="reach", mode="ee", robot="lekiwi")
-    env = build_env(config, 20)
-    outcome = build_session(config, env).run(1)
-    env.close()
-    assert outcome.success, outcome
-    assert outcome.contact_onsets == 0
 
 
 @pytest.mark.parametrize("task", [Tray, Drawer])

@@ -38,7 +38,7 @@ def test_reach_succeeds_at_the_goal_and_only_there():
 
 
 def test_pick_place_scenes_follow_their_description():
-    sides = set()
+    chassis, sides, counts = np.hypot(*load_model().description.base.size) / 2, set(), set()
     for episode in episodes(PickPlace()):
         scene = episode.scene
         sides.add(np.sign(scene.find("cube").position[1]))
@@ -55,16 +55,8 @@ def test_pick_place_scenes_follow_their_description():
             np.abs(bin_.position[:2] - bin_table.position[:2]) < bin_table.shape.size[:2] / 2 - size[:2] / 2
         )
         assert bin_.position[2] - size[2] / 2 == pytest.approx(bin_table.top)
-    assert sides == {-1.0, 1.0}
-
-
-def test_pick_place_obstacles_leave_room():
-    model = load_model()
-    counts = set()
-    for episode in episodes(PickPlace()):
-        obstacles = [item for item in episode.scene.objects if item.name.startswith("obstacle")]
+        obstacles = [item for item in scene.objects if item.name.startswith("obstacle")]
         counts.add(len(obstacles))
-        chassis = np.hypot(*model.description.base.size) / 2
         for index, item in enumerate(obstacles):
             away = np.linalg.norm(item.position[:2] - episode.q[:2]) - chassis - footprint(item)
             assert away > 0.15
@@ -72,7 +64,7 @@ def test_pick_place_obstacles_leave_room():
             for other in obstacles[:index]:
                 gap = np.linalg.norm(item.position[:2] - other.position[:2])
                 assert gap > footprint(item) + footprint(other)
-    assert counts == {2, 3}
+    assert (sides, counts) == ({-1.0, 1.0}, {2, 3})
 
 
 @pytest.mark.parametrize("robot", robot_names())
@@ -89,7 +81,7 @@ def test_pick_place_starts_in_contact_with_nothing_and_at_rest(robot):
             assert "cube" in state.still
 
 
-def test_obstacles_for_the_controller_are_those_of_the_scene():
+def test_obstacles_for_the_controller_are_those_of_the_scene_and_enclose_them():
     with environment() as env:
         env.reset(seed=0)
         obstacles = {item.name: item for item in env.obstacles()}
@@ -100,20 +92,16 @@ def test_obstacles_for_the_controller_are_those_of_the_scene():
         for name, obstacle in obstacles.items():
             pose = env.task_state().pose(name)
             np.testing.assert_allclose(obstacle.position, pose.position, atol=1e-9)
-
-
-def test_an_obstacle_encloses_what_mujoco_collides():
-    with environment() as env:
-        for seed in range(5):
-            env.reset(seed=seed)
-            compiled = env.simulation.mujoco_model
-            for obstacle in env.obstacles():
-                if obstacle.shape.kind != "box":
-                    continue
-                body = compiled.body(obstacle.name)
+            if obstacle.shape.kind == "box":
+                body = env.simulation.mujoco_model.body(name)
                 for index in range(body.geomadr[0], body.geomadr[0] + body.geomnum[0]):
-                    reach_ = np.abs(compiled.geom_pos[index]) + compiled.geom_size[index]
-                    assert np.all(reach_ <= obstacle.shape.size / 2 + 1e-9)
+                    compiled = env.simulation.mujoco_model
+                    size = np.abs(compiled.geom_pos[index]) + compiled.geom_size[index]
+                    assert np.all(size <= obstacle.shape.size / 2 + 1e-9)
+        with pytest.raises(HandrailError, match="unknown scene object 'cup': expected one of bin, "):
+            env.task_state().pose("cup")
+        with pytest.raises(HandrailError, match="unknown scene object 'cup'"):
+            env.task_state().object("cup")
 
 
 @pytest.mark.parametrize(
@@ -138,6 +126,7 @@ def test_pick_place_is_judged_by_where_the_cube_rests(where, gripper, success, r
         env.reset(options={"start": moved(env.start, "cube", places[where])})
         for _ in range(40):
             *_, terminated, _, info = env.step(action(env, gripper=gripper))
+            assert not (info["is_success"] and "cube" not in env.task_state().still)  # it flew through
             if terminated:
                 break
         assert info["is_success"] == success
@@ -160,24 +149,6 @@ def test_no_success_while_the_gripper_is_at_the_cube():
                 if terminated:
                     break
             assert info["is_success"] == success
-
-
-def test_no_success_while_the_cube_flies_through():
-    with environment() as env:
-        env.reset(seed=1)
-        high = env.start.scene.find("bin").position + 0.5 * UP
-        env.reset(options={"start": moved(env.start, "cube", high)})
-        inside_and_moving = 0
-        for _ in range(60):
-            *_, terminated, _, info = env.step(action(env))
-            state = env.task_state()
-            inside = abs(state.pose("cube").position[2] - state.pose("bin").position[2]) < 0.05
-            inside_and_moving += inside and "cube" not in state.still
-            assert not (info["is_success"] and "cube" not in state.still)
-            if terminated:
-                break
-        assert inside_and_moving > 0
-        assert info["is_success"]
 
 
 def test_a_grasped_cube_stays_through_lifting_driving_and_turning():
@@ -216,15 +187,6 @@ def test_a_scene_refuses_two_things_of_one_name():
     thing = SceneObject("thing", box([0.1] * 3), np.zeros(3))
     with pytest.raises(HandrailError, match="unique object names, got 'thing'"):
         Scene((thing, thing))
-
-
-def test_unknown_objects_are_named():
-    with environment() as env:
-        env.reset(seed=0)
-        with pytest.raises(HandrailError, match="unknown scene object 'cup': expected one of bin, "):
-            env.task_state().pose("cup")
-        with pytest.raises(HandrailError, match="unknown scene object 'cup'"):
-            env.task_state().object("cup")
 
 
 def test_no_room_for_obstacles_is_an_error():
