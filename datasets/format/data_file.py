@@ -1,11 +1,11 @@
 """Files of the rows of many episodes: grown by whole episodes, read one episode at a time.
 
 A row group holds some thousand rows: LeRobot opens a file in as many steps as it has groups, and whoever
-wants one episode reads its group. Episodes lie in a file in their order, so the statistics of `episode_index`
-say in log₂(groups) steps where one begins. A file whose statistics do not say, or say it wrongly, is read
-whole. Every page has a checksum, so that no rows are taken for others.
+wants one episode reads those groups whose statistics of `episode_index` allow it. A file whose statistics do
+not say, or say it wrongly, is read whole. Every page has a checksum, so that no rows are taken for others.
 """
 
+import math
 from collections.abc import Sequence
 from contextlib import closing, suppress
 from pathlib import Path
@@ -82,9 +82,8 @@ class DataFile:
         """
         self.path = path
         self._file = pq.ParquetFile(regular(path), page_checksum_verification=True)
-        self._groups = self._file.num_row_groups
-        self._column = _leaves(self._file.metadata).index(_EPISODE) if self._groups else 0
-        self._last: tuple[range, list[str] | None, pa.Table] | None = None  # what was read last
+        self._spans = _episode_spans(self._file.metadata)
+        self._last: tuple[list[int], list[str] | None, pa.Table] | None = None  # what was read last
 
     def rows(self, episode: int, length: int, columns: Sequence[str] | None = None) -> pa.Table:
         """Return the rows of an episode, in their order.
@@ -98,8 +97,9 @@ class DataFile:
             OSError, pyarrow.ArrowException, KeyError: A row group or a column cannot be read.
         """
         wanted = None if columns is None else list(dict.fromkeys((_EPISODE, *columns)))
-        found = self._read(self._near(episode), episode, wanted)
-        return found if found.num_rows == length else self._read(range(self._groups), episode, wanted)
+        near = [place for place, (least, most) in enumerate(self._spans) if least <= episode <= most]
+        found = self._read(near, episode, wanted)
+        return found if found.num_rows == length else self._read([*range(len(self._spans))], episode, wanted)
 
     def all(self) -> pa.Table:
         """Return all rows.
@@ -113,37 +113,23 @@ class DataFile:
         """Give the file free; safe to call twice."""
         self._file.close()
 
-    def _read(self, groups: range, episode: int, columns: list[str] | None) -> pa.Table:
+    def _read(self, groups: list[int], episode: int, columns: list[str] | None) -> pa.Table:
         if self._last is None or self._last[:2] != (groups, columns):
-            table = self._file.read_row_groups(list(groups), columns=columns, use_threads=False)
+            table = self._file.read_row_groups(groups, columns=columns, use_threads=False)
             self._last = groups, columns, table
         table = self._last[2]
         mask = to_numpy(table.column(_EPISODE).combine_chunks()) == episode
         return table if mask.all() else table.filter(numbers(mask, pa.bool_()))
 
-    def _near(self, episode: int) -> range:
-        """Return the row groups that may hold an episode, if the groups are in its order."""
-        return range(self._first(episode, after=False), self._first(episode, after=True))
 
-    def _first(self, episode: int, after: bool) -> int:
-        """Return the first row group with rows of this episode or a later one, or of a later one only."""
-        low, high = 0, self._groups
-        while low < high:
-            middle = (low + high) // 2
-            span = self._file.metadata.row_group(middle).column(self._column).statistics
-            if span is None or not span.has_min_max:
-                return self._groups if after else 0
-            if (span.min > episode) if after else (span.max >= episode):
-                high = middle
-            else:
-                low = middle + 1
-        return low
-
-
-def _leaves(metadata: pq.FileMetaData) -> list[str]:
-    """Return the paths of the columns; not by `schema`, which would keep the metadata in memory."""
-    group = metadata.row_group(0)
-    return [group.column(place).path_in_schema for place in range(group.num_columns)]
+def _episode_spans(metadata: pq.FileMetaData) -> list[tuple[float, float]]:
+    """Return the least and the greatest episode of each row group; not by `schema`, which keeps memory."""
+    spans = list[tuple[float, float]]()
+    for group in map(metadata.row_group, range(metadata.num_row_groups)):
+        columns = map(group.column, range(group.num_columns))
+        span = next(each for each in columns if each.path_in_schema == _EPISODE).statistics
+        spans.append((span.min, span.max) if span and span.has_min_max else (-math.inf, math.inf))
+    return spans
 
 
 class DataFiles:

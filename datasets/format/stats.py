@@ -6,7 +6,7 @@ Pictures: per channel over at most a few hundred frames, in [0, 1], from a 256-l
 LeRobot's quantiles of a dataset are means of the episodes' quantiles weighted by their counts; so are these.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -94,12 +94,7 @@ def merge_stats(first: Stats | None, second: Stats) -> Stats:
         return second
     if first.keys() != second.keys():
         raise ValueError(f"statistics of other columns: {', '.join(sorted(first.keys() ^ second.keys()))}")
-    large = [key for key in second if _is_large(first[key]) or _is_large(second[key])]
-    plain = [key for key in second if key not in large]
-    merged = {key: _merge_column(_wide(first[key]), _wide(second[key])) for key in large}
-    if plain:
-        merged |= _split(_merge_column(_joined(first, plain), _joined(second, plain)), second, plain)
-    return {key: merged[key] for key in second}
+    return {key: _merge_column(first[key], second[key]) for key in second}
 
 
 def stats_to_lists(stats: Stats) -> dict[str, dict[str, list]]:
@@ -117,45 +112,30 @@ def _many_rows_stats(rows: np.ndarray) -> Statistics:
     variance = np.mean(rows**2, axis=0) - mean**2
     stats = {"min": low, "max": high, "mean": mean, "std": np.sqrt(np.maximum(0, variance))}
     edges = np.linspace(low - 1e-10, high + 1e-10, BINS + 1)  # (BINS + 1, d)
-    stats |= _quantiles(rows, edges)
+    quantiles = np.stack([_quantiles(*each) for each in zip(rows.T, edges.T, strict=True)], axis=1)
+    stats |= dict(zip(QUANTILES, quantiles, strict=True))
     return {name: value.astype(np.float64) for name, value in stats.items()} | {
         "count": np.array([len(rows)])
     }
 
 
-def _quantiles(values: np.ndarray, edges: np.ndarray) -> Statistics:
-    """Return the quantiles of columns, interpolated inside the first bin up to which enough values lie.
+def _quantiles(values: np.ndarray, edges: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
+    """Return the quantiles of a column, interpolated inside the first bin up to which enough values lie.
+
+    In the first bin it is the lower edge, as LeRobot has it.
 
     Args:
-        values: `(N, d)`.
-        edges: of the bins of each column, `(BINS + 1, d)`.
+        values: `(N,)`.
+        edges: of the bins, `(BINS + 1,)`; the last bin is closed.
+        counts: How often each value occurs, `(N,)`; once without.
     """
-    targets, columns = (_SHARES * len(values))[:, None], np.arange(values.shape[1])
-    bins = np.sort([_bins(*each) for each in zip(values.T, edges.T, strict=True)]).T
-    chosen = bins[np.ceil(targets[:, 0]).astype(int) - 1]  # (quantiles, d)
-    before, inside = (each(bins, chosen[:, None]).sum(axis=1) for each in (np.less, np.equal))
-    found = _inside(edges[chosen, columns], edges[chosen + 1, columns], chosen, (targets - before) / inside)
-    return dict(zip(QUANTILES, found, strict=True))
-
-
-def _quantiles_of_counts(values: np.ndarray, counts: np.ndarray, edges: np.ndarray) -> dict[str, np.floating]:
-    """Return the same of one column in which each value occurs some times, `(N,)`."""
-    counts = np.bincount(_bins(values, edges), counts, minlength=BINS)
+    bins = np.minimum(np.searchsorted(edges, values, side="right"), BINS) - 1
+    counts = np.bincount(bins, counts, minlength=BINS)
     ranks = np.cumsum(counts)
     targets = _SHARES * ranks[-1]
     chosen = np.searchsorted(ranks, targets)
     share = (targets - (ranks[chosen] - counts[chosen])) / counts[chosen]
-    return dict(zip(QUANTILES, _inside(edges[chosen], edges[chosen + 1], chosen, share), strict=True))
-
-
-def _bins(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the bin of each value; the last bin is closed."""
-    return np.minimum(np.searchsorted(edges, values, side="right"), BINS) - 1
-
-
-def _inside(lower: np.ndarray, upper: np.ndarray, chosen: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return where in its bin a quantile is; in the first one, at its lower edge, as LeRobot has it."""
-    return lower + share * np.where(chosen > 0, upper - lower, 0.0)
+    return edges[chosen] + share * np.where(chosen > 0, edges[chosen + 1] - edges[chosen], 0.0)
 
 
 def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:
@@ -164,7 +144,7 @@ def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:
     mean = counts @ _LEVELS / total
     low, high = np.float32(present[0]), np.float32(present[-1])
     edges = np.linspace(low - 1e-10, high + 1e-10, BINS + 1)
-    quantiles = _quantiles_of_counts(_LEVELS[present], counts[present], edges)
+    quantiles = dict(zip(QUANTILES, _quantiles(_LEVELS[present], edges, counts[present]), strict=True))
     spread = np.sqrt(max(0.0, counts @ _LEVELS**2 / total - mean**2))
     return {"min": float(low), "max": float(high), "mean": mean, "std": spread, **quantiles}
 
@@ -176,9 +156,11 @@ def _finite_stats(rows: np.ndarray) -> Statistics:
     return stats | {"count": np.array([len(rows)])}
 
 
-def _merge_column(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> Statistics:
-    """Return the statistics of two sets of frames; `count` is (1,), or one a number."""
+def _merge_column(first: Statistics, second: Statistics) -> Statistics:
+    """Return the statistics of a column over two sets of frames."""
     n, m = first["count"], second["count"]
+    if max(np.abs(part[name]).max() for part in (first, second) for name in ("min", "max")) > _LARGE:
+        first, second = _wide(first), _wide(second)
     mean = (first["mean"] * n + second["mean"] * m) / (n + m)
     parts = ((first, n), (second, m))
     variance = sum((part["std"] ** 2 + (part["mean"] - mean) ** 2) * k for part, k in parts) / (n + m)
@@ -192,32 +174,8 @@ def _merge_column(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -
     }
 
 
-def _is_large(column: Mapping[str, np.ndarray]) -> bool:
-    """Return whether a statistic of a column cannot be squared."""
-    return max(abs(column["min"]).max(), abs(column["max"]).max()) > _LARGE
-
-
-def _wide(column: Mapping[str, np.ndarray]) -> Statistics:
-    return dict(column) | {name: column[name].astype(np.longdouble) for name in ("mean", "std", *QUANTILES)}
-
-
-def _joined(stats: Stats, keys: Sequence[str]) -> Statistics:
-    """Return the statistics of many columns, one after the other: one operation is quicker than many."""
-    sizes = [stats[key]["mean"].size for key in keys]
-    counts = [stats[key]["count"][0] for key in keys]
-    found = {name: np.concatenate([stats[key][name].ravel() for key in keys]) for name in MEASURED}
-    return found | {"count": np.repeat(counts, sizes)}
-
-
-def _split(joined: Mapping[str, np.ndarray], like: Stats, keys: Sequence[str]) -> Stats:
-    """Return each column's own part again, in the shape that it has elsewhere."""
-    found, begin = Stats(), 0
-    for key in keys:
-        mean = like[key]["mean"]
-        part = slice(begin, begin := begin + mean.size)
-        found[key] = {name: joined[name][part].reshape(mean.shape) for name in MEASURED}
-        found[key]["count"] = joined["count"][part][:1]
-    return found
+def _wide(column: Statistics) -> Statistics:
+    return column | {name: column[name].astype(np.longdouble) for name in ("mean", "std", *QUANTILES)}
 
 
 def _stride(image: np.ndarray) -> int:

@@ -1,9 +1,10 @@
 """JSON: written whole; what somebody else may have written is read small, shallow, finite, or not at all."""
 
 import json
-import math
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
+
+import msgspec
 
 import msgspec
 
@@ -13,7 +14,7 @@ from handrail.datasets.storage.atomic import write_whole
 
 MOST_BYTES = 16 * 1024 * 1024
 MOST_DEPTH = 50
-_WHOLE = 2**64  # beyond it a number is a mistake, and one of 400 digits no float
+_TOO_DEEP = ValueError(f"expected JSON nested at most {MOST_DEPTH} deep, got more")
 
 
 def read_json(path: Path) -> Any:
@@ -69,48 +70,19 @@ def parse_json(data: bytes) -> Any:
     if len(data) > MOST_BYTES:
         raise ValueError(f"expected at most {MOST_BYTES >> 20} MB of JSON, got more")
     try:
-        content = json.loads(data, parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
+        content = msgspec.json.decode(data)
     except RecursionError as error:
-        raise _too_deep() from error
-    _check(content)
+        raise _TOO_DEEP from error
+    _check(content, MOST_DEPTH)
     return content
 
 
-def _check(content: Any) -> None:
-    """Check how deep values lie and that all text can be printed, level by level."""
-    level, depth = [content], 0
-    while level:
-        for text in level:
-            if isinstance(text, str):
-                text.encode()  # half of a surrogate pair is no text: a ValueError
-        inner = [each for each in level if isinstance(each, dict | list)]
-        level = [child for each in inner for child in _children(each)]
-        depth += bool(inner)
-        if depth > MOST_DEPTH:
-            raise _too_deep()
-
-
-def _children(value: dict[str, Any] | list[Any]) -> list[Any]:
-    return [*value, *value.values()] if isinstance(value, dict) else value
-
-
-def _too_deep() -> ValueError:
-    return ValueError(f"expected JSON nested at most {MOST_DEPTH} deep, got more")
-
-
-def _refuse(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no JSON")
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text[:20]} is too large a number")
-    return value
-
-
-def _whole(text: str) -> int:
-    value = int(text) if len(text) < 25 else _WHOLE + 1
-    if abs(value) > _WHOLE:
-        raise ValueError(f"{text[:20]}… is too large a number")
-    return value
+def _check(value: Any, levels: int) -> None:
+    """Check that nothing lies deeper than some levels, and that every whole number can be a float."""
+    if isinstance(value, dict | list):
+        if not levels:
+            raise _TOO_DEEP
+        for each in value.values() if isinstance(value, dict) else value:
+            _check(each, levels - 1)
+    elif isinstance(value, int) and abs(value) > 2**64:
+        raise ValueError("a whole number beyond 2⁶⁴ is too large")
