@@ -20,7 +20,7 @@ from handrail.controllers.interface.command import Command
 from handrail.datasets.format.metadata import CLIENT
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.reading.open_dataset import OpenDataset, open_dataset
+from handrail.datasets.reading.reader import OpenDataset, open_dataset
 from handrail.datasets.recording.slice import TRIMMED
 
 _PICTURES = 8

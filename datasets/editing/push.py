@@ -17,7 +17,6 @@ from huggingface_hub.errors import HfHubHTTPError
 
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import regular
-from handrail.datasets.format.data_file import data_files
 from handrail.datasets.presentation.markdown import markdown_table, markdown_text
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
@@ -25,7 +24,7 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.load import recorded_episodes
-from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.reader import open_dataset
 from handrail.datasets.storage.atomic import explained, write_whole
 
 CARD = "README.md"
@@ -152,19 +151,19 @@ def _check_nobody(root: Path) -> None:
     above = [folder for folder in root.parents[:4] if (folder / _PEOPLE).is_dir()]
     if above:
         raise HandrailError(f"dataset {str(root)!r}: part of the user study in {above[0]}; it is never sent")
-    info, rows = read_info(root), read_episodes(root)
-    people = [row["episode_index"] for row in rows if row.get(_PARTICIPANT)]
-    if people:
-        others = [row["episode_index"] for row in rows if not row.get(_PARTICIPANT)]
-        advice = f"handrail-edit keep --episodes {_few(others)} leaves them out" if others else "all are"
-        raise HandrailError(
-            f"dataset {str(root)!r}: episodes {_few(people)} are of participants of a user study, which are"
-            f" never sent; {advice}"
-        )
-    suspects = [row for row in rows if _DEVICE in info.features and _PARTICIPANT not in row]
-    with data_files() as files:
-        driven = [row for row in suspects if any(read_rows_of(info, row, [_DEVICE], files)[_DEVICE] != "")]
-    unknown = [row["episode_index"] for row in driven]
+    with open_dataset(root) as dataset:
+        rows = dataset.rows
+        people = [row["episode_index"] for row in rows if row.get(_PARTICIPANT)]
+        if people:
+            others = [row["episode_index"] for row in rows if not row.get(_PARTICIPANT)]
+            advice = f"handrail-edit keep --episodes {_few(others)} leaves them out" if others else "all are"
+            raise HandrailError(
+                f"dataset {str(root)!r}: episodes {_few(people)} are of participants of a user study, which"
+                f" are never sent; {advice}"
+            )
+        known = _DEVICE in dataset.info.features
+        suspects = [row["episode_index"] for row in rows if known and _PARTICIPANT not in row]
+        unknown = [each for each in suspects if any(dataset.frames(each, [_DEVICE])[_DEVICE] != "")]
     if unknown:
         raise HandrailError(
             f"dataset {str(root)!r}: people drove episodes {_few(unknown)}, and another tool has dropped who,"

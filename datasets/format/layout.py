@@ -7,7 +7,6 @@ first of them. Two hidden folders are Handrail's own: `.handrail` (files being w
 """
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 FILES_IN_A_CHUNK = 1000
@@ -39,11 +38,20 @@ def episode_of(path: Path) -> int | None:
     return file_index_of(int(match[1]), int(match[2]))
 
 
-@dataclass(frozen=True)
 class Layout:
     """The paths of one dataset."""
 
-    root: Path  # The dataset's folder
+    def __init__(self, root: Path):
+        """Those below a dataset's folder."""
+        self.root = root
+        meta = root / "meta"
+        self.info = meta / "info.json"  # the file that LeRobot opens first
+        self.stats = meta / "stats.json"  # the statistics over all episodes
+        self.tasks = meta / "tasks.parquet"  # the task sentences
+        self.episodes = meta / "episodes"  # the episode rows
+        self.manifest = meta / "handrail.json"  # what Handrail keeps of the schema; written once, first
+        self.staging = root / STAGING  # files under temporary names, and the lock
+        self.damaged = root / DAMAGED  # where `repair` puts what it does not dare to delete
 
     def data(self, episode: int) -> Path:
         """Return the parquet with the rows of an episode."""
@@ -56,41 +64,6 @@ class Layout:
     def row(self, episode: int) -> Path:
         """Return the parquet with the metadata of an episode; it exists exactly if the episode is saved."""
         return self._numbered(EPISODES_PATH, episode)
-
-    @property
-    def info(self) -> Path:
-        """The file that LeRobot opens first."""
-        return self.root / "meta" / "info.json"
-
-    @property
-    def stats(self) -> Path:
-        """The statistics over all episodes."""
-        return self.root / "meta" / "stats.json"
-
-    @property
-    def tasks(self) -> Path:
-        """The task sentences."""
-        return self.root / "meta" / "tasks.parquet"
-
-    @property
-    def episodes(self) -> Path:
-        """The episode rows."""
-        return self.root / "meta" / "episodes"
-
-    @property
-    def manifest(self) -> Path:
-        """What Handrail keeps of the schema: written once, first of all."""
-        return self.root / "meta" / "handrail.json"
-
-    @property
-    def staging(self) -> Path:
-        """Files under temporary names, and the lock."""
-        return self.root / STAGING
-
-    @property
-    def damaged(self) -> Path:
-        """Where `repair` puts what it does not dare to delete."""
-        return self.root / DAMAGED
 
     def relative(self, path: Path) -> str:
         """Return a path inside the dataset as text, with forward slashes."""

@@ -94,15 +94,12 @@ def read_manifest(layout: Layout) -> Manifest:
         manifest.check()
         return manifest
     except (FileNotFoundError, NotADirectoryError) as error:
-        if not layout.root.is_dir():
-            why = f"dataset {root!r}: expected a folder, found none; create it first, or check the path"
-        elif layout.info.exists():
-            why = (
-                f"dataset {root!r} was not written by Handrail (no meta/handrail.json): choose another folder"
-            )
-        else:
-            why = f"{root!r} is not a LeRobot dataset (no meta/info.json): choose another folder"
-        raise HandrailError(why) from error
+        got = "a folder without one" if layout.root.is_dir() else "no folder"
+        if layout.info.exists():
+            got = "one that was not written by Handrail (no meta/handrail.json)"
+        raise HandrailError(
+            f"{root!r}: expected a LeRobot dataset, got {got}; choose another folder, or check the path"
+        ) from error
     except HandrailError as error:
         raise HandrailError(f"{str(layout.manifest)!r}: {error}") from error
     except (OSError, ValueError, KeyError, TypeError) as error:

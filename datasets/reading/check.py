@@ -6,12 +6,11 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
-from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.episode_rows import ForeignRowError
 from handrail.datasets.format.layout import FOLDERS, Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.schema import video_keys
-from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.reader import DatasetInfo, open_dataset, read_episodes, read_info
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.survey import Survey, shortened, survey
 from handrail.datasets.storage.atomic import explained
@@ -78,27 +77,20 @@ def _surveyed(root: str | Path, verify: bool) -> tuple[DatasetInfo, Survey | Non
 
 def _missing(info: DatasetInfo) -> list[str]:
     """Return the data and video files that the episodes name and that are not there."""
+    rows, cameras = read_episodes(info.root), video_keys(info.features)
     try:
-        names = list(dict.fromkeys(_files(info)))
+        names = [info.data_file(row) for row in rows]
+        names += [info.video_file(row, camera) for camera in cameras for row in rows]
     except (KeyError, ValueError, TypeError) as error:
         raise HandrailError(f"dataset {str(info.root)!r}: meta/episodes names no files: {error}") from error
-    return [name for name in names if not (info.root / name).is_file()]
-
-
-def _files(info: DatasetInfo) -> Iterator[str]:
-    rows = read_episodes(info.root)
-    for row in rows:
-        yield info.data_file(row)
-    for key in video_keys(info.features):
-        for row in rows:
-            yield info.video_file(row, key)
+    return [name for name in dict.fromkeys(names) if not (info.root / name).is_file()]
 
 
 def _unreadable(info: DatasetInfo) -> Iterator[str]:
     """Yield which episodes of a dataset without checksums cannot be read."""
-    with data_files() as files:
-        for row in read_episodes(info.root):
+    with open_dataset(info.root) as dataset:
+        for episode in range(len(dataset.rows)):
             try:
-                read_rows_of(info, row, None, files)
+                dataset.frames(episode)
             except HandrailError as error:
-                yield f"episode {row['episode_index']}: {error}"
+                yield f"episode {episode}: {error}"

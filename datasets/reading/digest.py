@@ -6,11 +6,10 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.info_file import fill
 from handrail.datasets.format.join import Videos
 from handrail.datasets.format.schema import video_keys
-from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.reader import DatasetInfo, open_dataset
 
 CLOCKS = ("wall_clock", "controller.solve_time")  # columns that no two recordings share
 
@@ -18,13 +17,11 @@ CLOCKS = ("wall_clock", "controller.solve_time")  # columns that no two recordin
 def digest_of_dataset(root: Path) -> str:
     """Return a digest of every value of every row without the clocks, then one of the pictures, if any."""
     digest = hashlib.sha256()
-    info, rows = read_info(root), read_episodes(root)
-    names = [name for name, each in info.features.items() if name not in CLOCKS and each.dtype != "video"]
-    with data_files() as files:
+    with open_dataset(root) as dataset:
+        info, rows = dataset.info, dataset.rows
+        names = [name for name, each in info.features.items() if name not in CLOCKS and each.dtype != "video"]
         for row in rows:
-            frames = read_rows_of(info, row, names, files)
-            for name in sorted(frames):
-                values = frames[name]
+            for name, values in sorted(dataset.frames(row["episode_index"], names).items()):
                 digest.update(f"{name} {values.shape} ".encode())
                 digest.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
     return digest.hexdigest()[:16] + digest_of_pictures(info, rows)

@@ -3,7 +3,8 @@
 Pictures are not read here; `LeRobotDataset` does that.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -145,11 +146,38 @@ def read_frames(
         For each column `(N,)` values where the feature's shape is `(1,)`, else `(N, *shape)`; strings as
         an array of str.
     """
-    info, rows = read_info(root), read_episodes(root)
-    if not 0 <= episode < len(rows):
-        raise HandrailError(f"episode {episode}: expected one of 0 to {len(rows) - 1} in {str(info.root)!r}")
+    with open_dataset(root) as dataset:
+        return dataset.frames(episode, columns)
+
+
+@dataclass(frozen=True)
+class OpenDataset:
+    """A dataset that is open for several episodes: read once what it is, its files stay open."""
+
+    info: DatasetInfo
+    rows: Sequence[dict[str, Any]]
+    """Rows of metadata of all episodes, in order."""
+    files: DataFiles
+    """Its data files that were read last."""
+
+    def row(self, episode: int) -> dict[str, Any]:
+        """Return the row of metadata of an episode."""
+        if not 0 <= episode < len(self.rows):
+            raise HandrailError(
+                f"--episode {episode}: expected one of 0 to {len(self.rows) - 1} in {self.info.root}"
+            )
+        return self.rows[episode]
+
+    def frames(self, episode: int, columns: Sequence[str] | None = None) -> dict[str, np.ndarray]:
+        """Return the rows of an episode, see `read_frames`."""
+        return read_rows_of(self.info, self.row(episode), columns, self.files)
+
+
+@contextmanager
+def open_dataset(root: str | Path) -> Iterator[OpenDataset]:
+    """Provide a dataset whose files are closed in the end."""
     with data_files() as files:
-        return read_rows_of(info, rows[episode], columns, files)
+        yield OpenDataset(read_info(root), read_episodes(root), files)
 
 
 def read_rows_of(

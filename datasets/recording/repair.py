@@ -8,9 +8,9 @@ rebuilt if they are not, to the byte, what the episodes say.
     handrail-edit repair path/to/dataset
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from handrail.datasets.format.episode_rows import with_checksums
 from handrail.datasets.format.info_file import read_encodings, summary_files
@@ -25,6 +25,12 @@ from handrail.datasets.recording.survey import Survey, said_to_be_saved, shorten
 from handrail.datasets.storage.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
 
+REWRITTEN = "whole, but as another tool wrote them"  # a repair renews their checksums
+REMOVED = "leftovers removed"  # of an interrupted recording
+MOVED = "files of no episode moved to .damaged"
+RESTORED = "files moved back"
+REBUILT = "written anew"  # summary files
+
 
 @dataclass(frozen=True)
 class RepairReport:
@@ -37,21 +43,13 @@ class RepairReport:
     """Faults of the episodes that are not whole and still in their place."""
     lost: tuple[str, ...] = ()
     """Faults of the episodes that are in quarantine now."""
-    rewritten: tuple[str, ...] = ()
-    """Files that another tool wrote anew and that are whole; a repair renews their checksums."""
-    removed: tuple[str, ...] = ()
-    """Leftovers of an interrupted recording, deleted."""
-    moved: tuple[str, ...] = ()
-    """Files of no episode, moved to the quarantine; the paths that they had."""
-    restored: tuple[str, ...] = ()
-    """Files moved back from there."""
-    rebuilt: tuple[str, ...] = ()
-    """Summary files written anew."""
+    done: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Paths in the dataset by what became of them."""
 
     @property
     def clean(self) -> bool:
         """Whether there was nothing to do."""
-        return self.complete and not any(self._files().values())
+        return self.complete and not any(self.done.values())
 
     @property
     def complete(self) -> bool:
@@ -62,17 +60,8 @@ class RepairReport:
         said = [f"dataset {str(self.root)!r}: {self.episodes} episodes"]
         said += [f"{len(self.damage)} damaged ({shortened(self.damage)})"] if self.damage else []
         said += [f"{len(self.lost)} set aside in .damaged ({shortened(self.lost)})"] if self.lost else []
-        said += [f"{what}: {shortened(paths, ', ')}" for what, paths in self._files().items() if paths]
+        said += [f"{what}: {shortened(paths, ', ')}" for what, paths in self.done.items() if paths]
         return "; ".join([*said, "nothing to repair"] if self.clean else said)
-
-    def _files(self) -> dict[str, tuple[str, ...]]:
-        return {
-            "whole, but as another tool wrote them": self.rewritten,
-            "leftovers removed": self.removed,
-            "files of no episode moved to .damaged": self.moved,
-            "files moved back": self.restored,
-            "written anew": self.rebuilt,
-        }
 
 
 def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
@@ -97,12 +86,12 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
                     row = layout.row(group.first)
                     replace(row, with_checksums(row, group.rewritten), layout.staging)
             counted = found.totals.episodes == found.episodes
-            done["rebuilt"] = _rebuild(layout, manifest, found.totals) if counted else ()
-            done["restored"] = tuple(restored)
+            done[RESTORED] = tuple(restored)
+            done[REBUILT] = _rebuild(layout, manifest, found.totals) if counted else ()
             if found.damage and set_aside_damaged:
                 totals = without_damaged(found, manifest)
-                return RepairReport(layout.root, totals.episodes, lost=found.damage, **done)
-            return RepairReport(layout.root, found.episodes, found.damage, **done)
+                return RepairReport(layout.root, totals.episodes, lost=found.damage, done=done)
+            return RepairReport(layout.root, found.episodes, found.damage, done=done)
 
 
 def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[RepairReport, Totals]:
@@ -119,11 +108,11 @@ def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[Re
     found = survey(layout, manifest, sums)
     found.require_whole()
     done = _clear(found)
-    done["rebuilt"] = _rebuild(layout, manifest, found.totals)
-    return RepairReport(layout.root, found.episodes, **done), found.totals
+    done[REBUILT] = _rebuild(layout, manifest, found.totals)
+    return RepairReport(layout.root, found.episodes, done=done), found.totals
 
 
-def _clear(found: Survey) -> dict[str, Any]:
+def _clear(found: Survey) -> dict[str, tuple[str, ...]]:
     """Remove what a crash left, and put what nobody can explain into quarantine; return all of these."""
     for path in found.leftovers:
         remove(path)
@@ -132,7 +121,7 @@ def _clear(found: Survey) -> dict[str, Any]:
     layout = found.layout
     removed = (*clear_staging(layout), *map(layout.relative, found.leftovers))
     moved = tuple(quarantine(layout, found.unknown))
-    return {"rewritten": found.rewritten, "removed": removed, "moved": moved}
+    return {REWRITTEN: found.rewritten, REMOVED: removed, MOVED: moved}
 
 
 def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, ...]:

@@ -31,7 +31,7 @@ from handrail.datasets.format.metadata import (
     fit_columns,
     plain_columns,
 )
-from handrail.datasets.format.schema import Feature, video_keys
+from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.tables import data_bytes
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.episode import OpenEpisode
@@ -70,6 +70,10 @@ class EpisodeWriter:
         self._layout, self._manifest, self._totals = layout, manifest, totals
         self._lock, self._types, self._unusable = lock, types, ""
         self._episode, self._encodings = OpenEpisode(layout, manifest), read_encodings(layout, manifest)
+        self.root = layout.root
+        """The dataset's folder."""
+        self.features = manifest.features
+        """The columns that each frame must have."""
         self.repaired = repaired
         """What `resume` put in order."""
         self.last: EpisodeRecord | None = None
@@ -118,16 +122,6 @@ class EpisodeWriter:
             types = read_column_types(row_files(layout)[-1]) if totals.episodes else None
             on_error.pop_all()
         return cls(layout, manifest, totals, lock, types, report)
-
-    @property
-    def root(self) -> Path:
-        """The dataset's folder."""
-        return self._layout.root
-
-    @property
-    def features(self) -> Mapping[str, Feature]:
-        """The columns that each frame must have."""
-        return self._manifest.features
 
     @property
     def num_episodes(self) -> int:

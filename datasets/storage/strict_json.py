@@ -6,15 +6,13 @@ from typing import Any
 
 import msgspec
 
-import msgspec
-
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import open_regular
 from handrail.datasets.storage.atomic import write_whole
 
 MOST_BYTES = 16 * 1024 * 1024
 MOST_DEPTH = 50
-_TOO_DEEP = ValueError(f"expected JSON nested at most {MOST_DEPTH} deep, got more")
+_TOO_DEEP = f"expected JSON nested at most {MOST_DEPTH} deep, got more"
 
 
 def read_json(path: Path) -> Any:
@@ -72,7 +70,7 @@ def parse_json(data: bytes) -> Any:
     try:
         content = msgspec.json.decode(data)
     except RecursionError as error:
-        raise _TOO_DEEP from error
+        raise ValueError(_TOO_DEEP) from error
     _check(content, MOST_DEPTH)
     return content
 
@@ -81,7 +79,7 @@ def _check(value: Any, levels: int) -> None:
     """Check that nothing lies deeper than some levels, and that every whole number can be a float."""
     if isinstance(value, dict | list):
         if not levels:
-            raise _TOO_DEEP
+            raise ValueError(_TOO_DEEP)
         for each in value.values() if isinstance(value, dict) else value:
             _check(each, levels - 1)
     elif isinstance(value, int) and abs(value) > 2**64:

@@ -29,7 +29,7 @@ from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording import file_group
-from handrail.datasets.recording.repair import repair
+from handrail.datasets.recording.repair import MOVED, repair
 
 SUMMARIES = ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json")
 
@@ -178,7 +178,7 @@ def test_a_file_named_after_an_episode_of_a_packed_file_is_no_episode(tmp_path):
     shutil.copy(Layout(root).data(0), Layout(root).data(2))
     assert check_report(root) == ["data/chunk-000/file-002.parquet: no file of a LeRobot dataset"]
     report = repair(root)
-    assert report.moved == ("data/chunk-000/file-002.parquet",)
+    assert report.done[MOVED] == ("data/chunk-000/file-002.parquet",)
     assert report.complete
     assert content(root) == before
 

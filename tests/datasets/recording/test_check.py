@@ -124,4 +124,4 @@ def test_statistics_that_are_no_json_are_noticed(root):
     stats = json.loads(Layout(root).stats.read_bytes())
     stats["action"]["max"] = [np.inf, 1.0]
     Layout(root).stats.write_text(json.dumps(stats))
-    assert check_report(root) == ["meta/stats.json: Infinity is no JSON"]
+    assert [fault.partition(":")[0] for fault in check_report(root)] == ["meta/stats.json"]

@@ -110,8 +110,8 @@ def test_resume_refuses_another_schema(tmp_path, change, words):
 
 
 def test_resume_refuses_what_handrail_did_not_write(tmp_path):
-    fails(lambda: resume(tmp_path / "none"), "found none")
-    fails(lambda: resume(tmp_path), "not a LeRobot dataset")
+    fails(lambda: resume(tmp_path / "none"), "no folder")
+    fails(lambda: resume(tmp_path), "a LeRobot dataset", "a folder without one")
     (tmp_path / "meta").mkdir()
     (tmp_path / "meta" / "info.json").write_text(json.dumps({"codebase_version": "v3.0"}))
     fails(lambda: resume(tmp_path), "not written by Handrail", "another folder")

@@ -32,7 +32,7 @@ from places import HELPERS
 
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.datasets.recording.repair import repair
+from handrail.datasets.recording.repair import MOVED, repair
 from handrail.datasets.storage.lock import LOCK_NAME
 
 GUILLOTINE = Guillotine()
@@ -82,7 +82,7 @@ def _check_after_kill(root: Path, saved: dict[int, str]) -> None:
         ).close()  # a folder that never became a dataset is as good as an empty one
     report = repair(root)
     assert len(saved) <= report.episodes <= len(saved) + 1
-    assert not report.moved
+    assert not report.done[MOVED]
     assert not report.damage
     for episode, expected in saved.items():
         assert digest(root, episode, cameras=False) == expected
@@ -246,7 +246,7 @@ def _check_survivors(root: Path, reported: dict[int, str]) -> None:
         assert digest(root, episode, cameras=True) == expected
     report = repair(root)
     assert len(reported) <= report.episodes <= len(reported) + 1
-    assert not report.moved
+    assert not report.done[MOVED]
     with resume(root, cameras=True) as writer:
         record_one(writer, cameras=True)
         reported |= {episode: digest(root, episode, cameras=True) for episode in range(writer.num_episodes)}

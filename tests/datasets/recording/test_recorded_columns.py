@@ -19,7 +19,7 @@ from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import check_frame
 from handrail.datasets.quality.summary import summarize
-from handrail.datasets.reading import open_dataset as open_dataset_module
+from handrail.datasets.reading import reader
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 from handrail.datasets.recording.frames import FARTHEST, MOST, Frame, frame_features, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -124,7 +124,7 @@ def test_an_episode_that_cannot_have_been_recorded_so_is_one_line(name, value, m
     (row, _), said = read_episodes(masked), {"seed": value}
     if name != "seed":
         said = {"settings": json.dumps(json.loads(row["settings"]) | {name: value})}
-    monkeypatch.setattr(open_dataset_module, "read_episodes", lambda root: [row | said])
+    monkeypatch.setattr(reader, "read_episodes", lambda root: [row | said])
     with pytest.raises(HandrailError, match=r"seed|28 numbers as observation\.state of ridgeback_panda"):
         replay.replay_episode(masked, 0)
 

@@ -25,7 +25,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.folder import quarantine
-from handrail.datasets.recording.repair import repair
+from handrail.datasets.recording.repair import MOVED, REBUILT, REMOVED, repair
 
 
 def _flip_a_byte(path, place=1 / 3):
@@ -67,8 +67,8 @@ def test_summary_files_are_rebuilt_to_the_byte(root, name, content):
     if content is not None:
         path.write_bytes(content)
     report = repair(root)
-    assert report.rebuilt == (path.relative_to(root).as_posix(),)
-    assert not report.moved
+    assert report.done[REBUILT] == (path.relative_to(root).as_posix(),)
+    assert not report.done[MOVED]
     assert tree(root) == before
     assert repair(root).clean
 
@@ -145,14 +145,14 @@ def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
     (layout.staging / "data.parquet").write_bytes(b"PAR1 and no footer")
     report = repair(root)
     assert report.episodes == 4
-    assert sorted(report.removed) == sorted(
+    assert sorted(report.done[REMOVED]) == sorted(
         [
             ".handrail/data.parquet",
             layout.relative(layout.data(4)),
             layout.relative(layout.video(CAMERAS[0], 4)),
         ]
     )
-    assert not report.moved
+    assert not report.done[MOVED]
     assert not report.damage
     assert not layout.data(4).exists()
 
@@ -176,7 +176,7 @@ def test_a_stray_file_that_lerobot_would_read_is_set_aside(root):
     shutil.copy(Layout(root).data(0), stray)
     report = repair(root)
     assert report.episodes == 4
-    assert report.moved == (stray.relative_to(root).as_posix(),)
+    assert report.done[MOVED] == (stray.relative_to(root).as_posix(),)
     assert open_with_lerobot(root).num_episodes == 4
 
 
@@ -184,7 +184,7 @@ def test_a_dataset_with_no_episode(tmp_path):
     create(tmp_path / "set").close()
     assert repair(tmp_path / "set").clean
     Layout(tmp_path / "set").info.unlink()
-    assert repair(tmp_path / "set").rebuilt == ("meta/info.json",)
+    assert repair(tmp_path / "set").done[REBUILT] == ("meta/info.json",)
     assert json.loads(Layout(tmp_path / "set").info.read_bytes())["total_episodes"] == 0
 
 

@@ -7,7 +7,7 @@ from datasets_helpers import record, resume, tree
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.recording.repair import repair
+from handrail.datasets.recording.repair import REMOVED, repair
 
 
 @pytest.mark.parametrize("asked", [False, True])
@@ -20,7 +20,7 @@ def test_lost_lines_of_metadata_never_cost_data(root, asked):
     assert report.episodes == (0 if asked else 4)
     assert all("is missing" in fault for fault in report.damage or report.lost)
     assert before <= set(tree(root / ".damaged" if asked else root).values())
-    assert not report.removed
+    assert not report.done[REMOVED]
 
 
 def test_a_dataset_of_which_only_the_count_is_left_may_begin_anew(root):
@@ -41,7 +41,7 @@ def test_the_last_line_and_the_count_gone_cost_no_data(tmp_path, episodes, info)
     layout.info.unlink() if info is None else layout.info.write_text(info)
     with pytest.raises(HandrailError, match=f"episode {episodes - 1}: meta/.* is missing"):
         resume(root)
-    assert not repair(root).removed
+    assert not repair(root).done[REMOVED]
     assert layout.data(episodes - 1).read_bytes() == rows
 
 
@@ -49,6 +49,6 @@ def test_the_last_line_gone_is_noticed_by_the_count(root):
     Layout(root).row(3).unlink()
     report = repair(root)
     assert report.damage == ("episode 3: meta/episodes/chunk-000/file-003.parquet is missing",)
-    assert not report.removed
+    assert not report.done[REMOVED]
     assert len(repair(root, set_aside_damaged=True).lost) == 1
     assert len(tree(root / ".damaged")) == 3
