@@ -15,17 +15,11 @@ from handrail.datasets.recording import repair as mending
 def inspect(config: InspectConfig) -> int:
     """Print a dataset's episodes as a table; return the exit code."""
     console, root = Terminal(), config.dataset.folder
-    faults: list[str] = []
-    if config.repair:
-        report = mending.repair(root)
-        faults += report.damage
-        console.print(str(report))
     if config.check:
-        found = check_report(root)
-        faults += found
-        console.print(*(found or ["checked: everything is as it was saved"]), sep="\n")
-    if faults:
-        return FAILED
+        faults = check_report(root)
+        console.print(*(faults or ["checked: everything is as it was saved"]), sep="\n")
+        if faults:
+            return FAILED
     if config.worst:
         metric = ranking_metric(config.worst)
         worst = worst_episodes(root, metric, config.count)

@@ -20,8 +20,6 @@ class ReplayConfig:
     dataset: StoredConfig = field(default_factory=StoredConfig)
     episode: int = -1
     """Which episode; all of them when negative."""
-    sheet: str = ""
-    """Also write a contact sheet of the episode to this .png file (needs OpenGL)."""
     video: str = ""
     """Also film the episode to this .mp4 file (needs OpenGL)."""
     task: Advanced[str] = ""
@@ -40,10 +38,9 @@ class ReplayConfig:
 
     def check(self) -> None:
         """Check the settings."""
-        for flag, file, ending in (("--sheet", self.sheet, ".png"), ("--video", self.video, ".mp4")):
-            check_file(flag, file, ending)
-            if file and self.episode < 0:
-                raise HandrailError(f"{flag}: expected --episode with the number of one episode")
+        check_file("--video", self.video, ".mp4")
+        if self.video and self.episode < 0:
+            raise HandrailError("--video: expected --episode with the number of one episode")
 
 
 @dataclass(frozen=True)
@@ -63,8 +60,6 @@ class InspectConfig:
     """Print the episodes of a LeRobot dataset as a table."""
 
     dataset: StoredConfig = field(default_factory=StoredConfig)
-    repair: bool = False
-    """Repair first what a crash left behind, as handrail-edit repair does."""
     check: bool = False
     """Read every byte and compare it with the checksums; exit code 1 if anything is not as it was saved."""
     quality: bool = False

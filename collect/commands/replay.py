@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from handrail.collect.commands.config import ReplayConfig
 from handrail.collect.session.build import build_env
-from handrail.collect.session.film import VideoFile, save_sheet
+from handrail.collect.session.film import VideoFile
 from handrail.collect.session.recorded import recorded_settings
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.arrays import FloatArray
@@ -23,7 +23,6 @@ from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.reader import OpenDataset, open_dataset
 from handrail.datasets.recording.slice import TRIMMED
 
-_PICTURES = 8
 _HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts begun")
 _MOST_TRIMMED = 100_000  # frames; more is a number made up
 Pictures = list[NDArray[np.uint8]]
@@ -74,21 +73,17 @@ class Replay:
 
 def replay(config: ReplayConfig) -> None:
     """Run a recorded episode's commands again, or those of all, and print the deviation."""
-    replays, sheet = list[Replay](), Path(config.sheet).expanduser()
+    replays = list[Replay]()
     video = Path(config.video).expanduser() if config.video else None
     with open_dataset(config.dataset.folder) as dataset:
         for episode in range(len(dataset.rows)) if config.episode < 0 else [config.episode]:
-            pictures = _PICTURES if config.sheet else 0
-            found, taken = replay_one_of(dataset, episode, pictures, video, config.said)
-            replays.append(found)
-            if taken:
-                save_sheet(taken, sheet)
+            replays.append(replay_one_of(dataset, episode, video=video, said=config.said)[0])
     say = Terminal().print
     say(Table(_HEADINGS, [each.cells for each in replays]))
     for client in sorted({each.robot_client for each in replays if each.robot_client}):
         say(f"Recorded through the client of {client}: replayed here in simulation, so it deviates.")
-    for written in filter(None, (config.sheet, config.video)):
-        say(f"Written: {written}")
+    if config.video:
+        say(f"Written: {config.video}")
 
 
 def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay, Pictures]:

@@ -144,7 +144,6 @@ COMMANDS = {
     "quality": ("inspect", "{}", "--quality"),
     "worst": ("inspect", "{}", "--worst", "smoothness"),
     "check": ("inspect", "{}", "--check"),
-    "inspect and repair": ("inspect", "{}", "--repair"),
     "repair": ("repair", "{}"),
     "set aside": ("repair", "{}", "--set_aside"),
     "compare": ("compare", "{}", "{plain}", "--output", "{out}"),

@@ -31,13 +31,12 @@ def test_a_replay_is_filmed_from_beginning_to_end(recorded, tmp_path):
     "words",
     [
         "--video folder --episode 0",
-        "--sheet folder --episode 0",
         "--video a.mp4",
         "--video a.gif --episode 0",
         "--video no/a.mp4 --episode 0",
     ],
 )
-def test_a_film_or_sheet_that_cannot_be_written_is_one_line(words, recorded, tmp_path, monkeypatch):
+def test_a_film_that_cannot_be_written_is_one_line(words, recorded, tmp_path, monkeypatch):
     """And nothing lies about afterwards."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
