@@ -1,62 +1,38 @@
 """What was collected: how many episodes, in how much of an operator's time, and what that time yields."""
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure
+from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure, Value
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.proportions import paired_shares, unpaired_shares
-from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap, permutation_p
+from handrail.datasets.statistics.resampling import FEWEST, bootstrap, permutation_p
 
 COLLECTING = "collecting"
 SUCCESS = Measure("success", "success while collecting", SHARE)
 HOURLY = Measure("successes_an_hour", "successes an operator hour", RATIO)
+_UNKNOWN = "success was not recorded for all"
 
 
-@dataclass(frozen=True)
-class Collected:
-    """The numbers of one group."""
-
-    label: str
-    episodes: int
-    successes: int | None  # None where success was not recorded for all
-    success_interval: Interval | None  # Wilson, 95 %
-    operator_time: float  # of all episodes, failures included, without the resets between them [s]
-    frames: int
-    reasons: Mapping[str, int]  # of failures, and how many of each
-
-    @property
-    def success(self) -> float | None:
-        """Share of the episodes that succeeded."""
-        return None if self.successes is None else self.successes / self.episodes
-
-    @property
-    def successes_an_hour(self) -> float | None:
-        """Of the operator's time."""
-        return None if self.successes is None else 3600.0 * self.successes / self.operator_time
-
-
-def collected(group: Group) -> Collected:
-    """Return the numbers of a group."""
-    results = [episode.success for episode in group.episodes]
-    successes = None if None in results else sum(map(bool, results))
-    failed = (episode for episode in group.episodes if episode.success is False)
-    reasons = Counter(str(each.meta.get("failure_reason") or "not recorded") for each in failed)
-    return Collected(
-        label=group.label,
-        episodes=len(results),
-        successes=successes,
-        success_interval=None if successes is None else wilson(successes, len(results)),
-        operator_time=group.seconds,
-        frames=sum(episode.count for episode in group.episodes),
-        reasons=dict(reasons.most_common()),
-    )
+def collected(group: Group, scope: str, rng: np.random.Generator | None = None) -> list[Value]:
+    """Return success and successes an hour of a group; `rng` resamples episodes for the interval of these."""
+    names: dict[str, Any] = {"label": group.label, "scope": scope}
+    count, seconds = len(group.episodes), group.seconds
+    if (successes := group.successes) is None:
+        return [Value(measure=each, **names, reason=_UNKNOWN) for each in (SUCCESS, HOURLY)]
+    share: dict[str, Any] = {
+        "estimate": successes / count,
+        "interval": wilson(successes, count),
+        "counts": (count,),
+    }
+    hourly: dict[str, Any] = {"estimate": 3600.0 * successes / seconds, "counts": (count,)}
+    if rng and count >= FEWEST:
+        hourly["interval"] = bootstrap(_numbers(group), _rate, True, rng)
+    return [Value(measure=SUCCESS, **names, **share), Value(measure=HOURLY, **names, **hourly)]
 
 
 def shared_seeds(one: Group, other: Group) -> list[tuple[int, int]]:
@@ -82,12 +58,10 @@ def _starts(group: Group) -> dict[tuple[str, int], int]:
 def success_difference(group: Group, baseline: Group) -> Contrast:
     """Return how success in collection differs from the baseline's."""
     names = _names(SUCCESS, group, baseline)
-    results = [[episode.success for episode in each.episodes] for each in (group, baseline)]
-    if any(None in each for each in results):
-        return Contrast(**names, reason="success was not recorded for all")
-    one, other = (list(map(bool, each)) for each in results)
-    pairs = shared_seeds(group, baseline)
-    if pairs:
+    if None in (group.successes, baseline.successes):
+        return Contrast(**names, reason=_UNKNOWN)
+    one, other = ([bool(episode.success) for episode in each.episodes] for each in (group, baseline))
+    if pairs := shared_seeds(group, baseline):
         found = paired_shares([one[i] for i, _ in pairs], [other[j] for _, j in pairs])
     else:
         found = unpaired_shares(one, other)
@@ -109,14 +83,6 @@ def matched_time(groups: Sequence[Group]) -> list[Group]:
     """Return the first episodes of each group that fit into the shortest group's operator time."""
     seconds = min(group.seconds for group in groups)
     return [group.within(seconds) for group in groups]
-
-
-def rate_interval(group: Group, rng: np.random.Generator) -> Interval | None:
-    """Return the 95 % bootstrap interval of successes an hour; None where it cannot be told."""
-    successes, seconds = _numbers(group)
-    if len(successes) < FEWEST or not np.isfinite(successes).all():
-        return None
-    return bootstrap((successes, seconds), _rate, True, rng)
 
 
 def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> Contrast:

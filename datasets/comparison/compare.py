@@ -1,23 +1,27 @@
 """The comparison of datasets, and of the policies that were trained on them: read, measure, judge."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison import collection
-from handrail.datasets.comparison.collection import Collected, matched_number, matched_time
+from handrail.datasets.comparison.collection import (
+    collected,
+    matched_number,
+    matched_time,
+    rate_ratio,
+    success_difference,
+)
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.episodes import MetricContrast, differences
+from handrail.datasets.comparison.episodes import differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.policies import Outcomes, judge_pairs, pairs_between
 from handrail.datasets.presentation.drawing import COLOURS
 from handrail.datasets.quality.measure import Measurements, measure_views
 from handrail.datasets.reading.check import check_whole
-from handrail.datasets.statistics.contrast import Contrast, adjusted
-from handrail.datasets.statistics.resampling import Interval
+from handrail.datasets.statistics.contrast import Contrast, Value, adjusted
 
 ALL = "all episodes"
 _SAME_NUMBER, _SAME_TIME = "the same number of episodes", "the same operator time"
@@ -29,9 +33,10 @@ class EpisodeChoice:
 
     title: str
     groups: Sequence[Group]  # of which quality was measured
-    collected: Sequence[Collected]  # failures are counted even where quality is measured without
+    collected: Sequence[Group]  # failures are counted even where quality is measured without
+    collecting: Sequence[Value]  # success and successes an hour of each
     measurements: Measurements
-    differences: Sequence[MetricContrast]  # of every metric, each group against the baseline
+    differences: Sequence[Contrast]  # of every metric, each group against the baseline
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,6 @@ class Comparison:
     baseline: str  # label that the others are compared with
     views: Sequence[EpisodeChoice]  # all episodes, as many of each, as much operator time of each
     collecting: Sequence[Contrast]  # success, then successes an hour, of each group against the baseline
-    rates: Mapping[str, Interval | None]  # of successes an hour of each group
     outcomes: Outcomes | None  # of trained policies, if evaluations were given
 
     @property
@@ -69,8 +73,8 @@ class Comparison:
     def colours(self) -> dict[str, str]:
         """A colour for each group, and each condition of policies that belongs to it."""
         found: dict[str, str] = dict(zip(self.labels, COLOURS, strict=False))
-        for condition in self.outcomes.conditions if self.outcomes else ():
-            found.setdefault(condition.label, found[group_of(condition.label, self.labels)])
+        for label in self.outcomes.conditions if self.outcomes else ():
+            found.setdefault(label, found[group_of(label, self.labels)])
         return found
 
     @property
@@ -79,6 +83,18 @@ class Comparison:
         policies = self.outcomes.differences if self.outcomes else ()
         metrics = [each for view in self.views for each in view.differences]
         return [*policies, *self.collecting, *metrics]
+
+    @property
+    def values(self) -> list[Value]:
+        """All measures of all conditions."""
+        policies = self.outcomes.values if self.outcomes else ()
+        metrics = [
+            value
+            for view in self.views
+            for each in view.measurements.values.values()
+            for value in each.values()
+        ]
+        return [*policies, *(each for view in self.views for each in view.collecting), *metrics]
 
 
 def compare(config: CompareConfig) -> Comparison:
@@ -93,19 +109,27 @@ def compare(config: CompareConfig) -> Comparison:
     rng = np.random.default_rng(config.seed)
     chosen = {ALL: groups, _SAME_NUMBER: matched_number(groups), _SAME_TIME: matched_time(groups)}
     counted = {title: _counted(title, each, config) for title, each in chosen.items()}
-    episodes = [{group.label: group.episodes for group in each} for each in counted.values()]
-    views = []
-    for title, measurements in zip(chosen, measure_views(episodes, rng, config.margin), strict=True):
-        found = differences(title, counted[title], measurements, baseline, rng)
-        numbers = [collection.collected(group) for group in chosen[title]]
-        views.append(EpisodeChoice(title, counted[title], numbers, measurements, found))
+    episodes = {title: {each.label: each.episodes for each in found} for title, found in counted.items()}
+    measured = zip(chosen, measure_views(episodes, rng, config.margin), strict=True)
+    views = [
+        EpisodeChoice(
+            title,
+            counted[title],
+            chosen[title],
+            [value for group in chosen[title] for value in collected(group, title)],
+            found,
+            differences(counted[title], found, baseline, rng),
+        )
+        for title, found in measured
+    ]
     (base,) = [group for group in groups if group.label == baseline]
     others = [group for group in groups if group is not base]
-    success = [collection.success_difference(group, base) for group in others]
-    rates = {group.label: collection.rate_interval(group, rng) for group in groups}
-    ratios = [collection.rate_ratio(group, base, rng) for group in others]
+    success = [success_difference(group, base) for group in others]
+    collecting = [value for group in groups for value in collected(group, ALL, rng)]
+    views[0] = replace(views[0], collecting=collecting)
+    ratios = [rate_ratio(group, base, rng) for group in others]
     outcomes = judge_pairs(conditions, pairs, rng) if conditions else None
-    return Comparison(config, baseline, views, adjusted([*success, *ratios]), rates, outcomes)
+    return Comparison(config, baseline, views, adjusted([*success, *ratios]), outcomes)
 
 
 def _counted(title: str, groups: Sequence[Group], config: CompareConfig) -> list[Group]:

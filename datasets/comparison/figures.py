@@ -4,18 +4,19 @@ What is better is always right.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from handrail.datasets.comparison.collection import SUCCESS
 from handrail.datasets.comparison.compare import Comparison
-from handrail.datasets.comparison.episodes import MetricContrast
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.presentation.drawing import GREY, INK, Panel, new_figure, rows, short, tidy
-from handrail.datasets.quality.metric import Metric
+from handrail.datasets.presentation.drawing import GREY, Panel, new_figure, rows, short, tidy
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.load import each_opened
 from handrail.datasets.reading.naming import position_entries
+from handrail.datasets.statistics.contrast import Contrast, Measure, Value
 
 _WIDTH = 5.2  # [inch]
 _LABEL, _SMALL_LABEL, _AXIS_LABEL = 26, 14, 30  # characters beside axes
@@ -33,30 +34,41 @@ def answer_panels(comparison: Comparison) -> list[Panel]:
 
 
 def _success(comparison: Comparison, height: float) -> Panel:
-    collected, outcomes = comparison.everything.collected, comparison.outcomes
-    found = [(each.label, each.success, each.success_interval, None, ()) for each in collected]
-    title, note = "Success while collecting", "95 % (Wilson)"
+    outcomes, title, note = comparison.outcomes, "Success while collecting", "95 % (Wilson)"
+    found = [each for each in comparison.everything.collecting if each.measure is SUCCESS]
     if outcomes:
-        found = [
-            (each.label, each.share, each.wilson, each.nested, each.seeds) for each in outcomes.conditions
-        ]
-        title = "Success of the policies"
+        found, title = list(outcomes.successes.values()), "Success of the policies"
         note = "95 %; thick: these policies, thin: with training too, ticks: each training seed"
     axes = new_figure(_WIDTH, height).subplots()
-    for row, (label, share, interval, nested, seeds) in enumerate(found):
-        colour = comparison.colours[label]
-        if share is None or interval is None:
-            axes.text(50, row, "not recorded", ha="center", va="center", color=GREY, size=8.5)
-            continue
-        thick = {"lw": 5.0, "alpha": 0.35, "solid_capstyle": "butt"} if outcomes else {"lw": 2.2}
-        axes.plot(np.multiply(100, interval), [row, row], color=colour, **thick)
-        if nested:
-            axes.plot(np.multiply(100, nested), [row, row], color=colour, lw=1.6)
-        axes.plot(np.multiply(100, seeds), np.full(len(seeds), row + 0.24), "|", color=colour, ms=6)
-        axes.plot(100 * share, row, "o", color=colour, ms=8, mec="white")
+    draw_values(axes, found, [{"color": comparison.colours[each.label]} for each in found], 100.0)
     axes.set(xlabel="%", xlim=(-2, 102))
-    rows(axes, [label for label, *_ in found], _LABEL)
+    rows(axes, [each.label for each in found], _LABEL)
     return Panel(title, axes.figure, note)
+
+
+def draw_values(
+    axes: Any, values: Sequence[Value], styles: Sequence[dict[str, Any]], scale: float = 1.0
+) -> None:
+    """Draw a row a value: the estimate, its intervals, and a tick for each unit.
+
+    Args:
+        axes: Of matplotlib.
+        values: One a row.
+        styles: How each is drawn: its color, perhaps its marker and label.
+        scale: What the numbers are multiplied with.
+    """
+    for row, (each, style) in enumerate(zip(values, styles, strict=True)):
+        if each.estimate is None:
+            place = {"transform": axes.get_yaxis_transform(), "ha": "center", "va": "center"}
+            axes.text(0.5, row, "no value", color=GREY, size=7.5, **place)
+            continue
+        color, ticks = style["color"], scale * each.known
+        axes.plot(ticks, np.full(len(ticks), row + 0.26), "|", color=color, ms=6, alpha=0.6)
+        if each.nested and each.interval:
+            axes.plot(np.multiply(scale, each.interval), [row, row], color=color, lw=5.0, alpha=0.35)
+        if each.widest:
+            axes.plot(np.multiply(scale, each.widest), [row, row], color=color, lw=1.8)
+        axes.plot(scale * each.estimate, row, **{"marker": "o", "ms": 7, "mec": "white"} | style)
 
 
 def _over_time(comparison: Comparison, height: float) -> Panel:
@@ -74,18 +86,18 @@ def _over_time(comparison: Comparison, height: float) -> Panel:
     return Panel(f"{what.capitalize()} over the operator's time", axes.figure)
 
 
-def turned(metric: Metric, ranked: bool) -> bool:
+def turned(metric: Measure, ranked: bool) -> bool:
     """Return whether a metric is drawn the other way round, so that right is better."""
     return ranked and metric.good == "lower"
 
 
-def _called(metric: Metric, ranked: bool) -> str:
+def _called(metric: Measure, ranked: bool) -> str:
     return f"{metric.title} {TURNED}" if turned(metric, ranked) else metric.title
 
 
 def effects_panels(comparison: Comparison) -> list[Panel]:
     """Return every metric's difference in standard deviations: those that can be better, then the others."""
-    found = [each for each in comparison.everything.differences if each.tested]
+    found = [each for each in comparison.everything.differences if each.interval]
     ranked, base = not comparison.unlike, comparison.baseline
     judged = [each for each in found if each.measure.good and ranked]
     rest = [each for each in found if each not in judged]
@@ -96,7 +108,7 @@ def effects_panels(comparison: Comparison) -> list[Panel]:
     return [Panel(title, _effects(each, comparison)) for title, each in drawn.items() if each]
 
 
-def _effects(found: Sequence[MetricContrast], comparison: Comparison) -> Any:
+def _effects(found: Sequence[Contrast], comparison: Comparison) -> Any:
     ranked, labels = not comparison.unlike, comparison.others
     metrics = list(dict.fromkeys(each.measure for each in found))
     axes = new_figure(8.4, 0.6 + 0.28 * len(metrics)).subplots()
@@ -110,7 +122,7 @@ def _effects(found: Sequence[MetricContrast], comparison: Comparison) -> Any:
     return axes.figure
 
 
-def draw_effect(axes: Any, each: MetricContrast, row: float, colour: str, sign: float) -> None:
+def draw_effect(axes: Any, each: Contrast, row: float, colour: str, sign: float) -> None:
     """Draw a difference with its interval; what lies outside, or is infinite, is an arrow at the edge."""
     estimate, *ends = (sign * value for value in each.effect)
     low, high = sorted(ends)
@@ -125,31 +137,21 @@ def draw_effect(axes: Any, each: MetricContrast, row: float, colour: str, sign: 
 
 
 def metrics_panels(comparison: Comparison) -> list[Panel]:
-    """Return each metric's values, one dot an episode, with mean and interval."""
-    view = comparison.everything
-    metrics = dict.fromkeys(each.measure for each in view.differences)
-    values = view.measurements.values
+    """Return each metric's mean with its interval, a tick an episode."""
+    metrics = dict.fromkeys(each.measure for each in comparison.everything.differences)
+    values = comparison.everything.measurements.values
     return [_metric(comparison, m) for m in metrics if any(v.known.size for v in values[m.name].values())]
 
 
-def _metric(comparison: Comparison, metric: Metric) -> Panel:
+def _metric(comparison: Comparison, metric: Measure) -> Panel:
     view, ranked = comparison.everything, not comparison.unlike
     apart = {each.label for each in view.differences if each.measure is metric and each.incomparable}
     axes = new_figure(2.7, 0.42 + 0.3 * len(view.groups)).subplots()
-    rng = np.random.default_rng(0)
-    for row, (label, found) in enumerate(view.measurements.values[metric.name].items()):
-        if not found.known.size or label in apart:
-            text, across = (
-                "not comparable" if found.known.size else "does not apply",
-                axes.get_yaxis_transform(),
-            )
-            axes.text(0.5, row, text, transform=across, ha="center", va="center", color=GREY, size=7.5)
-            continue
-        heights, colour = row + rng.uniform(-0.24, 0.24, len(found.known)), comparison.colours[label]
-        axes.plot(found.known, heights, "o", color=colour, ms=2.6, alpha=0.45, mew=0)
-        if found.interval:
-            axes.plot(found.interval, [row, row], color=INK, lw=1.8)
-        axes.plot(found.mean, row, "D", color=colour, ms=5, mec=INK, mew=0.8)
+    found = [
+        replace(each, estimate=None) if each.label in apart else each
+        for each in view.measurements.values[metric.name].values()
+    ]
+    draw_values(axes, found, [{"color": comparison.colours[each.label]} for each in found])
     rows(axes, comparison.labels, _SMALL_LABEL)
     axes.locator_params(axis="x", nbins=4)
     if turned(metric, ranked):

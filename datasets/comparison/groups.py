@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +32,27 @@ class Group:
 
     @property
     def seconds(self) -> float:
-        """The operator's time [s]."""
+        """The operator's time, failures included, without the resets between episodes [s]."""
         return sum(episode.seconds for episode in self.episodes)
+
+    @property
+    def successes(self) -> int | None:
+        """How many episodes succeeded; None where that was not recorded for all."""
+        results = [episode.success for episode in self.episodes]
+        return None if None in results else sum(map(bool, results))
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What was collected: the entry in the JSON of the report."""
+        failed = (episode for episode in self.episodes if episode.success is False)
+        reasons = Counter(str(each.meta.get("failure_reason") or "not recorded") for each in failed)
+        return {
+            "episodes": len(self.episodes),
+            "successes": self.successes,
+            "operator_time": self.seconds,
+            "frames": sum(episode.count for episode in self.episodes),
+            "reasons": dict(reasons.most_common()),
+        }
 
     def first(self, count: int) -> "Group":
         """Return the first episodes only."""

@@ -1,16 +1,17 @@
 """The answer of a comparison in a sentence or two, never more than the intervals; and what limits it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
 from handrail.datasets.comparison.collection import SUCCESS
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.policies import Outcomes
-from handrail.datasets.presentation.wording import number, percent, percent_span, points_span, span
-from handrail.datasets.statistics.contrast import SHARE, Contrast
+from handrail.datasets.comparison.report import sentence
+from handrail.datasets.presentation.wording import number, percent, percent_span
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.statistics.contrast import SHARE, Contrast, Value
 
 _MOST = 3  # differences that are named; the tables have all
-_UNKNOWN = "Whether episodes succeeded was not recorded for all of them."
 
 
 def headline(comparison: Comparison) -> str:
@@ -24,61 +25,48 @@ def headline(comparison: Comparison) -> str:
 
 
 def _of_policies(outcomes: Outcomes) -> Iterator[str]:
-    shares = {each.label: percent(each.share) for each in outcomes.conditions}
-    for each in outcomes.differences:
-        yield _told(each, shares[each.label], shares[each.baseline])
-    for each in outcomes.conditions if not outcomes.differences else ():
-        told = f"{each.label} {shares[each.label]} (95 % {percent_span(each.nested or each.wilson)})"
+    values = outcomes.successes
+    yield from _told(outcomes.differences, values)
+    for each in values.values() if not outcomes.differences else ():
+        told = f"{each.label} {percent(each.estimate)} (95 % {percent_span(each.widest)})"
         yield f"Success of policies: {told}, compared with no other."
 
 
 def _of_collecting(comparison: Comparison) -> Iterator[str]:
-    collected = {each.label: each for each in comparison.everything.collected}
-    for each in (
-        each for label in comparison.others for each in comparison.collecting if each.label == label
-    ):
-        sides = collected[each.label], collected[each.baseline]
-        if each.measure is SUCCESS:
-            yield _UNKNOWN if each.reason else _told(each, *(percent(side.success) for side in sides))
-        elif not each.reason:
-            yield _told(each, *(number(side.successes_an_hour) for side in sides))
+    known = [each for each in comparison.collecting if not each.reason or each.measure is SUCCESS]
+    values = {(each.label, each.measure): each for each in comparison.everything.collecting}
+    for label in comparison.others:
+        for each in (each for each in known if each.label == label):
+            sides = {side: values[side, each.measure] for side in (each.label, each.baseline)}
+            yield from _told([each], sides)
 
 
-def _told(each: Contrast, one: str, other: str) -> str:
-    interval, share = each.nested or each.interval, each.measure.unit == SHARE
-    gap = f"difference {points_span(interval)} points" if share else f"ratio {span(interval)}"
-    sides = f"{each.label} {one}, {each.baseline} {other}"
-    seen = "a" if each.detected else "no"
-    return f"{each.measure.title.capitalize()}: {sides}; {gap} (95 %), {seen} difference detected."
+def _told(contrasts: Sequence[Contrast], values: Mapping[str, Value]) -> Iterator[str]:
+    for each in contrasts:
+        text = percent if each.measure.unit == SHARE else number
+        sides = (f"{side} {text(values[side].estimate)}" for side in (each.label, each.baseline))
+        yield sentence(each, each.measure.title.capitalize(), *sides)
 
 
-def cautions(comparison: Comparison) -> list[str]:
-    """Return the limits of the headline."""
+def cautions(comparison: Comparison) -> dict[str, bool]:
+    """Return what limits the headline, and whether it does."""
     groups, differences = comparison.everything.groups, comparison.everything.differences
-    moving = [each for each in differences if each.measure.needs in ("motion", "position")]
+    moving = [metric.name for metric in METRICS if metric.needs in ("motion", "position")]
     rates, fewest = {group.info.fps for group in groups}, min(len(group.episodes) for group in groups)
-    limits = [
-        (len(rates) > 1 and any(each.tested for each in moving), _RATES),
-        (any(each.incomparable for each in differences), _UNITS),
-        (fewest < 20, _FEW),
-    ]
-    training = _of_training(comparison.outcomes) if comparison.outcomes else [(True, _NO_POLICIES)]
-    return [text for holds, text in [*training, *limits] if holds]
-
-
-def _of_training(outcomes: Outcomes) -> list[tuple[bool, str]]:
-    """Return whether a limit of the policies' intervals and tests holds, and its text."""
-    conditions = outcomes.conditions
-    amounts = [
-        [each.trained_on[name] for each in conditions if name in each.trained_on]
-        for name in ("episodes", "operator_time")
-    ]
-    return [
-        (min(len(each.seeds) for each in conditions) < 5, _FEW_SEEDS),
-        (all(each.draws == 1 for each in conditions), _ONE_DRAW),
-        (any(not each.paired for each in outcomes.differences), _NO_PAIRS),
-        (any(max(known) > 1.05 * min(known) for known in amounts if known), _AMOUNTS),
-    ]
+    outcomes = comparison.outcomes
+    policies = [each.content for each in outcomes.conditions.values()] if outcomes else []
+    data = [each["trained_on"] for each in policies]
+    amounts = [[each[name] for each in data if name in each] for name in ("episodes", "operator_time")]
+    return {
+        _NO_POLICIES: not policies,
+        _FEW_SEEDS: any(len(each["seeds"]) < 5 for each in policies),
+        _ONE_DRAW: bool(policies) and all(each["draws"] == 1 for each in policies),
+        _NO_PAIRS: any(not each.paired for each in outcomes.differences) if outcomes else False,
+        _AMOUNTS: any(max(known) > 1.05 * min(known) for known in amounts if known),
+        _RATES: len(rates) > 1 and any(e.interval for e in differences if e.measure.name in moving),
+        _UNITS: any(each.incomparable for each in differences),
+        _FEW: fewest < 20,
+    }
 
 
 _NO_POLICIES = (

@@ -5,9 +5,9 @@ from dataclasses import asdict
 from typing import Any
 
 from handrail.datasets.comparison import figures, tables
-from handrail.datasets.comparison.collection import Collected
-from handrail.datasets.comparison.compare import Comparison, EpisodeChoice
-from handrail.datasets.comparison.groups import group_of
+from handrail.datasets.comparison.collection import HOURLY, SUCCESS
+from handrail.datasets.comparison.compare import Comparison
+from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.headline import cautions, headline
 from handrail.datasets.comparison.pictures import first_pictures
 from handrail.datasets.comparison.policies import Outcomes
@@ -16,7 +16,6 @@ from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import Panel, svg
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, duration, number, percent, percent_span, span
-from handrail.datasets.quality.catalogue import METRICS
 
 FORMAT = "handrail.comparison/3"
 _REST = "The report has every metric, also where no difference was detected: that does not mean equal."
@@ -43,7 +42,7 @@ _SLOWEST = (
 
 def dataset_report(comparison: Comparison) -> Report:
     """Return the report of a comparison of datasets."""
-    outcomes, view, limits = comparison.outcomes, comparison.everything, cautions(comparison)
+    outcomes, view = comparison.outcomes, comparison.everything
     detected = [each for each in view.differences if each.detected]
     policies = tables.policy_tables(outcomes) if outcomes else []
     collecting = [tables.collection_table(view), tables.collection_differences_table(comparison)]
@@ -55,10 +54,10 @@ def dataset_report(comparison: Comparison) -> Report:
         title=f"{', '.join(others)} and {last}, compared",
         what=f"{', '.join(sorted(names))} – {tables.shown_tasks(sorted(tasks))}",
         headline=headline(comparison),
-        cautions=limits,
+        limits=cautions(comparison),
         tables=[*policies, *collecting, told],
         first=[
-            markup.cards(_card(comparison, each) for each in view.collected),
+            markup.cards(_card(comparison, group) for group in view.collected),
             markup.section("", _legend(comparison), _drawn(figures.answer_panels(comparison))),
         ],
         sections=[
@@ -70,31 +69,21 @@ def dataset_report(comparison: Comparison) -> Report:
             ("What does not apply, or is not comparable", [missing] if missing.rows else []),
         ],
         how=_HOW,
-        measures=METRICS,
+        values=comparison.values,
         contrasts=comparison.contrasts,
         content={
             "format": FORMAT,
             "baseline": comparison.baseline,
             "unlike": comparison.unlike,
             "config": asdict(comparison.config),
-            "headline": headline(comparison),
-            "cautions": limits,
-            "successes_an_hour": comparison.rates,
-            "conditions": {each.title: _conditions(each) for each in comparison.views},
-            "policies": list(map(asdict, outcomes.conditions)) if outcomes else [],
+            "conditions": {
+                view.title: {group.label: group.content for group in view.collected}
+                for view in comparison.views
+            },
+            "policies": [each.content for each in outcomes.conditions.values()] if outcomes else [],
         },
         units={"episodes.csv": _episode_rows(comparison)},
     )
-
-
-def _conditions(view: EpisodeChoice) -> dict[str, Any]:
-    values = view.measurements.values.items()
-    return {
-        each.label: asdict(each)
-        | {"successes_an_hour": each.successes_an_hour}
-        | {"metrics": {name: groups[each.label].content for name, groups in values}}
-        for each in view.collected
-    }
 
 
 def _episode_rows(comparison: Comparison) -> list[dict[str, Any]]:
@@ -117,39 +106,42 @@ def _legend(comparison: Comparison) -> str:
     return markup.legend((label, comparison.colours[label]) for label in comparison.labels)
 
 
-def _card(comparison: Comparison, each: Collected) -> str:
+def _card(comparison: Comparison, group: Group) -> str:
     """Return a group's card: success of its policies if there are any, else in collection."""
-    interval, known = comparison.rates[each.label], each.successes is not None
-    rate = number(each.successes_an_hour) + (f" ({span(interval)})" if interval else "")
-    big, first = f"{each.episodes} episodes", []
+    found = {each.measure: each for each in comparison.everything.collecting if each.label == group.label}
+    success, hourly = found[SUCCESS], found[HOURLY]
+    count = f"{len(group.episodes)} episodes"
+    rate = number(hourly.estimate) + (f" ({span(hourly.interval)})" if hourly.interval else "")
+    big, first, known = count, [], not success.reason
     if comparison.outcomes:
-        big, told = _of_policies(comparison.outcomes, each.label, comparison.labels)
-        first = [told, *([f"collecting: {percent(each.success)}"] if known else [])]
+        big, told = _of_policies(comparison.outcomes, group.label, comparison.labels)
+        first = [told, *([f"collecting: {percent(success.estimate)}"] if known else [])]
     elif known:
-        big = percent(each.success)
-        first = [f"succeeded while collecting, {percent_span(each.success_interval)} (95 %)"]
+        big = percent(success.estimate)
+        first = [f"succeeded while collecting, {percent_span(success.interval)} (95 %)"]
     lines = [
         *first,
-        f"{each.episodes} episodes in {duration(each.operator_time)} of operator time",
-        f"{rate} successes per operator hour" if known else "success was not recorded",
+        f"{count} in {duration(group.seconds)} of operator time",
+        f"{rate} successes per operator hour" if known else success.reason,
     ]
-    return markup.card(each.label, comparison.colours[each.label], big, lines)
+    return markup.card(group.label, comparison.colours[group.label], big, lines)
 
 
 def _of_policies(outcomes: Outcomes, label: str, labels: Sequence[str]) -> tuple[str, str]:
     """Return the success of a group's policies and what it is of: of the group's own name first."""
-    mine = [condition for condition in outcomes.conditions if group_of(condition.label, labels) == label]
+    mine = [each for each in outcomes.successes.values() if group_of(each.label, labels) == label]
     if not mine:
         return DASH, "no policy was evaluated"
-    condition = min(mine, key=lambda condition: condition.label != label)
-    whose = "" if condition.label == label else f" of {condition.label}"
-    interval = percent_span(condition.nested or condition.wilson)
-    return percent(condition.share), f"policy success{whose}, {interval} (95 %)"
+    value = min(mine, key=lambda each: each.label != label)
+    whose = "" if value.label == label else f" of {value.label}"
+    return percent(value.estimate), f"policy success{whose}, {percent_span(value.widest)} (95 %)"
 
 
 def _quality(comparison: Comparison) -> list[str | Table]:
     turned = "" if comparison.unlike else f" {figures.TURNED}: less is better, so the metric is turned round."
-    rows = [[view.title, *(str(each.episodes) for each in view.collected)] for view in comparison.views]
+    rows = [
+        [view.title, *(str(len(group.episodes)) for group in view.collected)] for view in comparison.views
+    ]
     return [
         _legend(comparison),
         _drawn(figures.effects_panels(comparison), "wide"),

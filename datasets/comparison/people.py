@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import unknown_name
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.report import Report, contrast_table, measure_cell, shown
+from handrail.datasets.comparison.report import Report, contrast_table, values_table
 from handrail.datasets.comparison.scores import SCORES
 from handrail.datasets.comparison.user_study import (
     MEASURES,
@@ -27,7 +26,16 @@ from handrail.datasets.comparison.user_study import (
 from handrail.datasets.presentation.markup import paragraph
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.reading.check import check_whole
-from handrail.datasets.statistics.contrast import LEVEL, Contrast, Estimate, Measure, adjusted
+from handrail.datasets.statistics.contrast import (
+    LEVEL,
+    Contrast,
+    Estimate,
+    Measure,
+    Value,
+    adjusted,
+    contrast,
+)
+from handrail.datasets.statistics.means import mean_value
 from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, difference_of_means, permutation_p
 
 FORMAT = "handrail.people/2"
@@ -51,60 +59,32 @@ Scenes = Mapping[int | None, Sequence[float]]  # values by scene
 OfPeople = Mapping[str, Scenes]  # by participant
 
 
-@dataclass(frozen=True, kw_only=True)
-class Mean(Estimate):
-    """A measure under one condition; of scripted operators an episode counts as a participant does."""
-
-    label: str
-    scripted: bool
-    total: int  # participants (or scripted episodes) there are; `counts` has those with a value
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """Its entry in the JSON."""
-        named = {"label": self.label, "scripted": self.scripted, "count": self.counts[0], "total": self.total}
-        return named | {"mean": self.estimate, "interval": self.interval}
-
-
-@dataclass(frozen=True)
-class PeoplePart:
-    """A task, or the forms."""
-
-    title: str
-    measures: Sequence[Measure]
-    means: dict[str, list[Mean]]  # by measure: people's conditions first, then scripted operators'
-    contrasts: list[Contrast]  # of every measure, each condition against the baseline; people only
-
-    def tables(self, baseline: str, note: str) -> list[Table]:
-        """Return the table of means, and that of the differences if there are any."""
-        (first, *_) = self.means.values()
-        labels = [f"{mean.label}, scripted" if mean.scripted else mean.label for mean in first]
-        rows = [
-            [measure_cell(each), *(_cell(mean, each) for mean in self.means[each.name])]
-            for each in self.measures
-        ]
-        columns = ("measure", "group", "difference", "95 %", "p, Holm", "n")
-        title = f"{note}{self.title}: against {baseline}, paired by participant"
-        differences = contrast_table(self.contrasts, columns, title, _CONTRASTS)
-        means = Table(("", *labels), rows, f"{note}{self.title}", _MEANS)
-        return [means, differences] if self.contrasts else [means]
-
-
-def _cell(mean: Mean, measure: Measure) -> Any:
-    return shown(measure, mean.estimate, mean.interval, f"n = {mean.counts[0]} of {mean.total}")
-
-
 @dataclass(frozen=True)
 class PeopleComparison:
-    """The result of a comparison of people."""
+    """The result of a comparison of people; the scope of a value or a contrast is a task, or the forms."""
 
-    config: CompareConfig
     study: StudyData
     baseline: str  # condition that the others are compared with
     participants: Sequence[str]  # everyone who has an episode
     trials: Sequence[Trial]
-    parts: Sequence[PeoplePart]  # a task each, and the forms last
-    cautions: Sequence[str]
+    values: Sequence[Value]  # of people's conditions, then of scripted operators'
+    contrasts: Sequence[Contrast]  # of every measure, each condition against the baseline; people only
+    limits: Mapping[str, object]
+
+    def tables(self, scope: str) -> list[Table]:
+        """Return the table of means of a task or the forms, and that of the differences if there are any."""
+        note = f"{self.study.source}. " if self.study.demo else ""
+        values = [each for each in self.values if each.scope == scope]
+        contrasts = [each for each in self.contrasts if each.scope == scope]
+        means = values_table(values, f"{note}{scope}", _MEANS, note=_count)
+        columns = ("measure", "group", "difference", "95 %", "p, Holm", "n")
+        title = f"{note}{scope}: against {self.baseline}, paired by participant"
+        differences = contrast_table(contrasts, columns, title, _CONTRASTS)
+        return [means, differences] if contrasts else [means]
+
+
+def _count(value: Value) -> str:
+    return f"n = {len(value.known)} of {len(value.values)}"
 
 
 def compare_people(config: CompareConfig) -> PeopleComparison:
@@ -119,58 +99,60 @@ def compare_people(config: CompareConfig) -> PeopleComparison:
         raise unknown_name("baseline", config.baseline, study.conditions)
     baseline, rng = config.baseline or study.conditions[0], np.random.default_rng(config.seed)
     participants = tuple(sorted({trial.participant for trial in trials if trial.participant}))
-    parts = []
+    values: list[Value] = []
+    contrasts: list[Contrast] = []
     for task in dict.fromkeys(trial.task for trial in trials):
         chosen = [trial for trial in trials if trial.task == task]
         driven = list(dict.fromkeys(trial.condition for trial in chosen if trial.participant))
-        total = len({trial.participant for trial in chosen if trial.participant})
-        parts.append(compared(task, MEASURES, chosen, driven, baseline, total, rng))
+        people = dict.fromkeys(trial.participant for trial in chosen if trial.participant)
+        found = compared(task, MEASURES, chosen, driven, baseline, list(people), rng)
+        values, contrasts = values + found[0], contrasts + found[1]
     forms = form_trials(study, FORMS)
-    parts.append(compared(FORMS, SCORES, forms, study.conditions, baseline, len(participants), rng))
-    cautions = _cautions(study, participants, parts, left_out)
-    return PeopleComparison(config, study, baseline, participants, trials, parts, cautions)
+    found = compared(FORMS, SCORES, forms, study.conditions, baseline, participants, rng)
+    values, contrasts = values + found[0], contrasts + found[1]
+    limits = _limits(study, participants, trials, contrasts, left_out)
+    return PeopleComparison(study, baseline, participants, trials, values, contrasts, limits)
 
 
 def compared(
-    title: str,
+    scope: str,
     measures: Sequence[Measure],
     trials: Sequence[Trial],
     labels: Sequence[str],
     baseline: str,
-    total: int,
+    participants: Sequence[str],
     rng: np.random.Generator,
-) -> PeoplePart:
-    """Return the means of every measure under every condition, and each condition against the baseline.
+) -> tuple[list[Value], list[Contrast]]:
+    """Return every measure under every condition, and each condition against the baseline.
 
     Args:
-        title: Of the part: a task, or the forms.
+        scope: A task, or the forms.
         measures: Which.
-        trials: Of the part.
+        trials: Of the task.
         labels: Of the conditions under which people drove.
         baseline: The condition that the others are compared with.
-        total: Participants there are.
+        participants: Who there is.
         rng: Of resampling and permutation.
     """
     scripted = list(dict.fromkeys(each.condition for each in trials if not each.participant))
-    means: dict[str, list[Mean]] = {}
+    values: list[Value] = []
     contrasts: list[Contrast] = []
     for measure in measures:
         people = {label: _of_people(trials, label, measure.name) for label in labels}
-        found = means[measure.name] = []
-        for label, values in people.items():
-            each = np.array([_mean(scenes) for scenes in values.values() if scenes])
-            found.append(Mean(label=label, scripted=False, total=total, **vars(_mean_of(each, rng))))
+        found = {}
+        for label, scenes in people.items():
+            means = [_mean(scenes.get(name, {})) for name in dict.fromkeys([*scenes, *participants])]
+            found[label] = mean_value(measure, label, np.array(means), rng, scope=scope)
+        values += found.values()
         for label in scripted:
             drawn = [t.values[measure.name] for t in trials if (t.condition, t.participant) == (label, "")]
-            known = np.array([value for value in drawn if math.isfinite(value)])
-            found.append(Mean(label=label, scripted=True, total=len(drawn), **vars(_mean_of(known, rng))))
+            values.append(mean_value(measure, f"{label}, scripted", np.array(drawn), rng, scope=scope))
         contrasts += [
-            contrast(measure, label, baseline, people[label], people[baseline], rng)
+            contrast(found[label], found[baseline], paired_by_scene(people[label], people[baseline], rng))
             for label in labels
             if label != baseline and baseline in people
         ]
-    tested = adjusted(replace(each, scope=title, family=title) for each in contrasts)
-    return PeoplePart(title, measures, means, tested)
+    return values, adjusted(replace(each, family=scope) for each in contrasts)
 
 
 def _of_people(trials: Sequence[Trial], label: str, measure: str) -> OfPeople:
@@ -184,17 +166,7 @@ def _of_people(trials: Sequence[Trial], label: str, measure: str) -> OfPeople:
     return found
 
 
-def _mean_of(values: FloatArray, rng: np.random.Generator) -> Estimate:
-    """Return the mean over units, each of which counts alike; its interval for five or more."""
-    if not len(values):
-        return Estimate(counts=(0,))
-    interval = bootstrap_mean(values, rng) if len(values) >= FEWEST else None
-    return Estimate(estimate=float(values.mean()), interval=interval, counts=(len(values),))
-
-
-def contrast(
-    measure: Measure, label: str, baseline: str, one: OfPeople, other: OfPeople, rng: np.random.Generator
-) -> Contrast:
+def paired_by_scene(one: OfPeople, other: OfPeople, rng: np.random.Generator) -> Estimate:
     """Return how a condition differs from the baseline, paired by participant, and by scene where possible.
 
     d_p = mean over the scenes that participant p met under both; where they met none twice, the difference of
@@ -202,15 +174,17 @@ def contrast(
     """
     both = [name for name in one if one[name] and other.get(name)]
     differences = np.array([_difference(one[name], other[name]) for name in both])
-    p, found = None, _mean_of(differences, rng)
-    if len(both) >= FEWEST and differences.any():
-        p = permutation_p((differences, np.zeros_like(differences)), difference_of_means, True, rng)
-    names = {"measure": measure, "label": label, "baseline": baseline, "paired": True, "p": p}
-    return Contrast(**vars(found) | names)
+    enough, zeros, p = len(both) >= FEWEST, np.zeros_like(differences), None
+    interval = bootstrap_mean(differences, rng) if enough else None
+    if enough and differences.any():
+        p = permutation_p((differences, zeros), difference_of_means, True, rng)
+    estimate = float(differences.mean()) if both else None
+    return Estimate(estimate=estimate, interval=interval, p=p, counts=(len(both),), paired=True)
 
 
 def _mean(scenes: Scenes) -> float:
-    return float(np.mean([value for values in scenes.values() for value in values]))
+    known = [value for values in scenes.values() for value in values]
+    return float(np.mean(known)) if known else math.nan
 
 
 def _difference(one: Scenes, other: Scenes) -> float:
@@ -225,54 +199,53 @@ def _within_reach(contrasts: Sequence[Contrast]) -> bool:
     return any(each.tests * 2.0 ** (1 - each.counts[0]) < LEVEL for each in contrasts if each.p is not None)
 
 
-def _cautions(
-    study: StudyData, participants: Sequence[str], parts: Sequence[PeoplePart], left_out: int
-) -> list[str]:
+def _limits(
+    study: StudyData,
+    participants: Sequence[str],
+    trials: Sequence[Trial],
+    contrasts: Sequence[Contrast],
+    left_out: int,
+) -> dict[str, object]:
+    """Return what limits the comparison, and whether it does."""
     count, strangers = len(participants), {each.participant for each in study.scores} - set(participants)
-    means = [mean for part in parts for means in part.means.values() for mean in means]
-    reach = count < FEWEST or all(_within_reach(part.contrasts) for part in parts)
-    known = [
-        (
-            count < FEWEST,
-            f"Participants: {count}. Intervals and tests need {FEWEST} or more, so there are none.",
-        ),
-        (not reach, f"Participants: {count}. Too few to detect any difference in some tables."),
-        (any(mean.scripted for mean in means), _SCRIPTED),
-        (any(not part.contrasts and part.title != FORMS for part in parts), _ALONE),
-        (not study.scores, "No scores yet: exports/scores.csv is not there."),
-        (bool(strangers), f"Participants with scores and without an episode: {len(strangers)}."),
-        (left_out > 0, f"Episodes that name neither a participant nor a script, left out: {left_out}."),
-    ]
-    return [text for holds, text in known if holds]
+    tasks = dict.fromkeys(trial.task for trial in trials)
+    scopes = [[each for each in contrasts if each.scope == scope] for scope in (*tasks, FORMS)]
+    reach = all(map(_within_reach, scopes))
+    return {
+        f"Participants: {count}. Intervals and tests need {FEWEST} or more, so there are none.": count
+        < FEWEST,
+        f"Participants: {count}. Too few to detect any difference in some tables.": count >= FEWEST
+        and not reach,
+        _SCRIPTED: any(not trial.participant for trial in trials),
+        _ALONE: not all(scopes[:-1]),
+        "No scores yet: exports/scores.csv is not there.": not study.scores,
+        f"Participants with scores and without an episode: {len(strangers)}.": strangers,
+        f"Episodes that name neither a participant nor a script, left out: {left_out}.": left_out,
+    }
 
 
 def people_report(comparison: PeopleComparison) -> Report:
     """Return the report of a comparison of people."""
-    study, parts, baseline = comparison.study, comparison.parts, comparison.baseline
-    source, note = {"source": study.source}, f"{study.source}. " if study.demo else ""
-    tables = [table for part in parts for table in part.tables(baseline, note)]
+    study, baseline = comparison.study, comparison.baseline
+    source, scopes = {"source": study.source}, dict.fromkeys(each.scope for each in comparison.values)
+    tables = [table for scope in scopes for table in comparison.tables(scope)]
     content = {
         "format": FORMAT,
         "demo": study.demo,
         "baseline": baseline,
         "participants": comparison.participants,
-        "cautions": comparison.cautions,
-        "conditions": {
-            part.title: {name: [mean.content for mean in means] for name, means in part.means.items()}
-            for part in parts
-        },
     }
     return Report(
         title=f"{study.root.absolute().name}: people, compared",
         what=f"{len(comparison.participants)} participants; baseline {baseline}",
         first=[paragraph(study.source, "headline")] if study.demo else (),
-        cautions=comparison.cautions,
+        limits=comparison.limits,
         tables=tables,
         sections=[("", [table]) for table in tables],
         how=_HOW,
-        measures=list(dict.fromkeys(measure for part in parts for measure in part.measures)),
         content=source | content,
-        contrasts=[each for part in parts for each in part.contrasts],
+        values=comparison.values,
+        contrasts=comparison.contrasts,
         units={"trials.csv": [source | _row(trial) for trial in comparison.trials]},
         source=source,
     )

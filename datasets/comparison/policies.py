@@ -1,6 +1,6 @@
 """How policies trained on the datasets fared, and how sure that is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,45 +9,23 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import SUCCESS, Condition
 from handrail.datasets.comparison.groups import group_of
-from handrail.datasets.statistics.contrast import SHARE, Contrast, Estimate, Measure, adjusted
+from handrail.datasets.statistics.contrast import SHARE, Contrast, Estimate, Measure, Value, adjusted
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.proportions import independent_trials, paired_shares, unpaired_shares
 from handrail.datasets.statistics.replicates import (
     chance_of_means,
+    chance_of_shares,
     replicates,
     standard_error,
     t_interval,
     welch_p,
     wider,
 )
-from handrail.datasets.statistics.resampling import Interval, Run, percentiles, resample_runs
+from handrail.datasets.statistics.resampling import Run, percentiles, resample_runs
 
 LIKE_FOR_LIKE, MIXED = "like-for-like", "mixed"  # families: mixed policies differ in more than their data
 POLICIES = "policies"
 POLICY_SUCCESS = Measure("policy_success", "success of policies", SHARE, "higher", "share of rollouts")
-
-
-@dataclass(frozen=True)
-class ConditionOutcome:
-    """The numbers of one condition."""
-
-    label: str
-    successes: int
-    rollouts: int
-    wilson: Interval
-    """95 % for these very policies, of as many rollouts as those in the same scenes are worth."""
-    nested: Interval | None
-    """95 % over dataset draw, training seed and evaluation seed: the wider of the nested bootstrap's and
-    Student's over replicates; None for one replicate."""
-    seeds: tuple[float, ...]  # success of each trained policy
-    draws: int  # of the dataset
-    means: Mapping[str, tuple[float, Interval]]  # of every other outcome; intervals are as `nested`
-    trained_on: Mapping[str, float]  # of the first policy
-
-    @property
-    def share(self) -> float:
-        """Success over all rollouts."""
-        return self.successes / self.rollouts
 
 
 @dataclass(frozen=True)
@@ -61,10 +39,16 @@ class Pair:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """All conditions, and each against its baseline."""
+    """How policies fared, and each condition against its baseline."""
 
-    conditions: tuple[ConditionOutcome, ...]
-    differences: tuple[Contrast, ...]
+    conditions: Mapping[str, Condition]
+    values: Sequence[Value]  # success, then the other outcomes, of each condition
+    differences: Sequence[Contrast]
+
+    @property
+    def successes(self) -> dict[str, Value]:
+        """Success by condition."""
+        return {each.label: each for each in self.values if each.measure is POLICY_SUCCESS}
 
 
 def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
@@ -100,38 +84,38 @@ def judge_pairs(
     """Compare the success of conditions, each with a baseline of its own, family by family."""
     runs = {label: condition.runs() for label, condition in conditions.items()}
     resampled = dict(zip(runs, resample_runs(list(runs.values()), rng), strict=True))
-    found = tuple(_condition(condition, resampled[label], rng) for label, condition in conditions.items())
-    return Outcomes(found, tuple(adjusted(_difference(pair, runs, resampled) for pair in pairs)))
+    values = [each for label, one in conditions.items() for each in _values(one, resampled[label], rng)]
+    found = [_difference(pair, runs, resampled) for pair in pairs]
+    return Outcomes(conditions, values, adjusted(found))
 
 
-def _condition(condition: Condition, resampled: FloatArray, rng: np.random.Generator) -> ConditionOutcome:
-    runs = condition.runs()
-    values, means = np.concatenate([run.values for run in runs]), replicates(runs)
-    worth, nested = independent_trials(values, [seed for run in runs for seed in run.seeds]), None
-    if len(means) > 1:
-        by_t = t_interval(float(means.mean()), *standard_error([runs]))
-        nested = wider(percentiles(resampled), by_t, 0.0, 1.0)
-    return ConditionOutcome(
-        label=condition.label,
-        successes=int(values.sum()),
-        rollouts=len(values),
-        wilson=wilson(float(values.mean()) * worth, worth),
-        nested=nested,
-        seeds=tuple(float(run.values.mean()) for run in runs),
-        draws=len({run.draw for run in runs}),
-        means={name: _mean(condition.runs(name), rng) for name in condition.outcomes if name != SUCCESS},
-        trained_on=condition.policies[0].trained_on,
-    )
+def _values(condition: Condition, resampled: FloatArray, rng: np.random.Generator) -> Iterator[Value]:
+    """Yield success and the other outcomes.
 
-
-def _mean(runs: Sequence[Run], rng: np.random.Generator) -> tuple[float, Interval]:
-    (resampled,) = resample_runs([runs], rng)
-    values, means = np.concatenate([run.values for run in runs]), replicates(runs)
-    interval = percentiles(resampled)
-    if len(means) > 1:
-        by_t = t_interval(float(means.mean()), *standard_error([runs], chance_of_means))
-        interval = wider(interval, by_t, 0.0 if values.min() >= 0.0 else -np.inf, np.inf)
-    return float(values.mean()), interval
+    `interval` of the success is Wilson's for these very policies, of as many rollouts as those in the same
+    scenes are worth. `nested` is over dataset draw, training seed and evaluation seed: the wider of the
+    nested bootstrap's and Student's over replicates; of the success None for one replicate.
+    """
+    for name in condition.outcomes:
+        runs, success = condition.runs(name), name == SUCCESS
+        values, means = np.concatenate([run.values for run in runs]), replicates(runs)
+        nested = percentiles(resampled if success else resample_runs([runs], rng)[0])
+        if len(means) > 1:
+            error = standard_error([runs], chance_of_shares if success else chance_of_means)
+            low = 0.0 if success or values.min() >= 0.0 else -np.inf
+            by_t = t_interval(float(means.mean()), *error)
+            nested = wider(nested, by_t, low, 1.0 if success else np.inf)
+        worth = independent_trials(values, [seed for run in runs for seed in run.seeds]) if success else 0.0
+        yield Value(
+            measure=POLICY_SUCCESS if success else Measure(name, name),
+            label=condition.label,
+            scope=POLICIES,
+            values=np.array([run.values.mean() for run in runs]),
+            estimate=float(values.mean()),
+            interval=wilson(float(values.mean()) * worth, worth) if success else None,
+            nested=None if success and len(means) < 2 else nested,
+            counts=(len(values),),
+        )
 
 
 def _difference(

@@ -20,7 +20,7 @@ from handrail.datasets.presentation.wording import (
     signed,
     span,
 )
-from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure
+from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure, Value
 from handrail.datasets.statistics.resampling import Interval
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.csv_file import csv_text
@@ -28,13 +28,42 @@ from handrail.datasets.storage.csv_file import csv_text
 Rows = Sequence[Mapping[str, Any]]
 
 
-def shown(measure: Measure, value: float | None, interval: Interval | None = None, more: str = "") -> Cell:
-    """Return a value of a measure, its interval and more below."""
-    if value is None:
-        return Cell("missing", "quiet", below=more)
-    texts = (percent, percent_span) if measure.unit == SHARE else (number, span)
-    below = (texts[1](interval), more) if interval else (more,)
-    return Cell(texts[0](value), below="; ".join(filter(None, below)))
+def shown(value: Value, *more: str) -> Cell:
+    """Return a value of a measure, its intervals and more below."""
+    if value.estimate is None:
+        return Cell("missing", "quiet", value.reason, "; ".join(more))
+    share = value.measure.unit == SHARE
+    text, spanned = (percent, percent_span) if share else (number, span)
+    training = f"{spanned(value.nested)} with training" if value.nested else ""
+    below = spanned(value.interval) if value.interval else "", training, *more
+    return Cell(text(value.estimate), below="; ".join(filter(None, below)))
+
+
+def values_table(
+    values: Sequence[Value],
+    title: str = "",
+    caption: str = "",
+    rows: Mapping[str, Mapping[str, str]] | None = None,
+    note: Callable[[Value], str] = lambda value: "",
+) -> Table:
+    """Return a row a measure, a column a condition; then rows of texts by label.
+
+    Args:
+        values: What is shown.
+        title: Above the table.
+        caption: Below it.
+        rows: More, by heading.
+        note: What stands below a value, beside its interval.
+    """
+    labels = list(dict.fromkeys(each.label for each in values))
+    cells = {(each.measure.name, each.label): shown(each, note(each)) for each in values}
+    measures = {each.measure.name: each.measure for each in values}
+    found: list[Sequence[Cell | str]] = [
+        [measure_cell(each), *(cells.get((name, label), DASH) for label in labels)]
+        for name, each in measures.items()
+    ]
+    found += [[name, *(texts[label] for label in labels)] for name, texts in (rows or {}).items()]
+    return Table(("", *labels), found, title, caption)
 
 
 def measure_cell(measure: Measure, ranked: bool = True, mark: str = "") -> Cell:
@@ -48,9 +77,25 @@ def difference_cell(each: Contrast, below: str = "") -> Cell:
     """Return the estimate, bold where a difference was detected."""
     if each.estimate is None:
         return Cell("missing" if not each.reason else DASH, "quiet", each.reason)
-    texts = {SHARE: f"{points(each.estimate)} points", RATIO: f"× {number(each.estimate)}"}
-    look = "detected" if each.detected else ""
-    return Cell(texts.get(each.measure.unit, signed(each.estimate)), look, below=below)
+    return Cell(_difference(each, each.estimate), "detected" if each.detected else "", below=below)
+
+
+def _difference(each: Contrast, estimate: float) -> str:
+    texts = {SHARE: f"{points(estimate)} points", RATIO: f"× {number(estimate)}"}
+    return texts.get(each.measure.unit, signed(estimate))
+
+
+def sentence(each: Contrast, name: str, *sides: str) -> str:
+    """Return what a contrast says, never more than its intervals; `sides` are the values of both."""
+    if each.estimate is None:
+        return f"{name}: {each.reason}."
+    told, interval = ", ".join(sides), each.widest
+    told = f"{told}; {_difference(each, each.estimate)}" if told else _difference(each, each.estimate)
+    if interval is None:
+        return f"{name}: {told}; one draw tests nothing."
+    seen = f"{'a' if each.detected else 'no'} difference detected"
+    verdict = "not tested before all draws are done" if each.p_adjusted is None else seen
+    return f"{name}: {told} (95 % {_interval(each.measure, interval)}), {verdict}."
 
 
 def _interval(measure: Measure, interval: Interval | None) -> str:
@@ -97,33 +142,41 @@ class Report:
 
     title: str
     headline: str = ""
-    cautions: Sequence[str] = ()
+    limits: Mapping[str, object] = field(default_factory=dict)  # texts, and whether each holds
     tables: Sequence[Table] = ()  # of the terminal
     what: str = ""  # is compared
     first: Sequence[str] = ()  # below the headline
     sections: Sequence[tuple[str, Sequence[str | Table]]]
     how: str  # to read it
-    measures: Sequence[Measure] = ()
-    content: Mapping[str, Any]  # of the JSON, beside the contrasts
+    content: Mapping[str, Any]  # of the JSON, beside values and contrasts
+    values: Sequence[Value]
     contrasts: Sequence[Contrast]
     units: Mapping[str, Rows] = field(default_factory=dict)  # of CSV files, a row for each unit
     source: Mapping[str, Any] = field(default_factory=dict)  # of the numbers, in each row of differences.csv
 
     @property
+    def cautions(self) -> list[str]:
+        """The limits that hold."""
+        return [text for text, holds in self.limits.items() if holds]
+
+    @property
     def html(self) -> str:
         """The page: the answer first, then how it came about."""
         cautions = items(("caution", text) for text in self.cautions)
-        meanings = items(("quiet", f"{each.title}: {each.meaning}.") for each in self.measures)
+        measures = {each.measure.name: each.measure for each in self.values if each.measure.meaning}
+        meanings = items(("quiet", f"{each.title}: {each.meaning}.") for each in measures.values())
         parts = [paragraph(self.headline, "headline") if self.headline else "", *self.first]
         parts += [section("Read this first", cautions) if self.cautions else ""]
         parts += [section(title, *shown) for title, shown in self.sections if any(shown)]
-        told = [paragraph(self.how), folded("What every measure means", meanings) if self.measures else ""]
+        told = [paragraph(self.how), folded("What every measure means", meanings) if measures else ""]
         return page(self.title, *parts, section("How to read this", *told), what=self.what)
 
     @property
     def json(self) -> str:
-        """Content and contrasts."""
-        whole = {**self.content, "contrasts": [each.content for each in self.contrasts]}
+        """Content, values and contrasts."""
+        numbers = {"values": self.values, "contrasts": self.contrasts}
+        whole = {**self.content, "headline": self.headline, "cautions": self.cautions}
+        whole |= {name: [each.content for each in found] for name, found in numbers.items()}
         return json.dumps(_plain(whole), indent=1, allow_nan=False) + "\n"
 
     def write(self, folder: Path, name: str = "report.json") -> list[Path]:

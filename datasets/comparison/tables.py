@@ -3,16 +3,23 @@
 from collections.abc import Sequence
 
 from handrail.datasets.comparison.compare import Comparison, EpisodeChoice
-from handrail.datasets.comparison.episodes import FOLLOWS, MetricContrast
+from handrail.datasets.comparison.episodes import FOLLOWS
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.policies import ConditionOutcome, Outcomes
-from handrail.datasets.comparison.report import contrast_table, difference_cell, measure_cell
+from handrail.datasets.comparison.policies import Outcomes
+from handrail.datasets.comparison.report import (
+    contrast_table,
+    difference_cell,
+    measure_cell,
+    shown,
+    values_table,
+)
 from handrail.datasets.presentation import wording
 from handrail.datasets.presentation.table import Cell, Table
-from handrail.datasets.presentation.wording import DASH, number, percent, percent_span, span
+from handrail.datasets.presentation.wording import DASH, number, percent, span
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.worst import RANKING, deletion, ranked
+from handrail.datasets.statistics.contrast import Contrast
 
 _TASKS, _WORST = 2, 3  # sentences, and episodes of each metric, that are shown
 _UNTESTED = "described, not tested: episodes share neighbours"
@@ -25,22 +32,19 @@ def shown_tasks(tasks: Sequence[str]) -> str:
 
 def collection_table(view: EpisodeChoice) -> Table:
     """Return the numbers of each group."""
-    headings = ("", "episodes", "success", "95 %", "operator time", "successes / h", "why not")
-    rows = [
-        [
-            each.label,
-            str(each.episodes),
-            percent(each.success),
-            percent_span(each.success_interval),
-            wording.duration(each.operator_time),
-            number(each.successes_an_hour),
-            ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items()) or DASH,
-            shown_tasks(group.tasks),
-            group.info.robot_type or DASH,
-        ]
-        for group, each in zip(view.groups, view.collected, strict=True)
-    ]
-    return Table((*headings, "task", "robot"), rows)
+    facts = {group.label: group.content for group in view.collected}
+    reasons = {label: each["reasons"].items() for label, each in facts.items()}
+    rows = {
+        "episodes": {label: str(each["episodes"]) for label, each in facts.items()},
+        "operator time": {label: wording.duration(each["operator_time"]) for label, each in facts.items()},
+        "why not": {
+            label: ", ".join(f"{reason} ({count})" for reason, count in each) or DASH
+            for label, each in reasons.items()
+        },
+        "task": {group.label: shown_tasks(group.tasks) for group in view.groups},
+        "robot": {group.label: group.info.robot_type or DASH for group in view.groups},
+    }
+    return values_table(view.collecting, rows=rows)
 
 
 def collection_differences_table(comparison: Comparison) -> Table:
@@ -51,34 +55,21 @@ def collection_differences_table(comparison: Comparison) -> Table:
 
 def policy_tables(outcomes: Outcomes) -> list[Table]:
     """Return how each condition's policies fared, and how they differ in success."""
-    names = list(dict.fromkeys(name for condition in outcomes.conditions for name in condition.means))
-    intervals = wording.THESE_POLICIES, wording.WITH_TRAINING
-    headings = ("trained on", "success", *intervals, "each training seed", "data")
-    headings += tuple(f"{name} / 100 rollouts" if name == "contacts" else name for name in names)
-    rows = [
-        [
-            each.label,
-            f"{each.successes} of {each.rollouts}: {percent(each.share)}",
-            percent_span(each.wilson),
-            percent_span(each.nested),
-            ", ".join(map(percent, each.seeds)),
-            ", ".join(f"{name} {number(value)}" for name, value in each.trained_on.items()) or DASH,
-            *(_outcome(each, name) for name in names),
-        ]
-        for each in outcomes.conditions
-    ]
+    facts = {label: each.content for label, each in outcomes.conditions.items()}
+    rows = {
+        "rollouts": {label: f"{each['successes']} of {each['rollouts']}" for label, each in facts.items()},
+        "each training seed": {
+            label: ", ".join(map(percent, each["seeds"])) for label, each in facts.items()
+        },
+        "data": {
+            label: ", ".join(f"{name} {number(value)}" for name, value in each["trained_on"].items()) or DASH
+            for label, each in facts.items()
+        },
+    }
     columns = ("group", "difference", "95 %", wording.WITH_TRAINING, "p, Holm", "family", "detectable")
     caption = f"95 %: {wording.THESE_POLICIES}"
     differences = contrast_table(outcomes.differences, columns, "Success of policies", caption)
-    return [Table(headings, rows), differences]
-
-
-def _outcome(condition: ConditionOutcome, name: str) -> Cell:
-    if name not in condition.means:
-        return Cell(DASH, "quiet", "not every rollout has it")
-    mean, (low, high) = condition.means[name]
-    factor = 100.0 if name == "contacts" else 1.0
-    return Cell(number(factor * mean), below=span((factor * low, factor * high)))
+    return [values_table(outcomes.values, rows=rows), differences]
 
 
 def metrics_table(comparison: Comparison, label: str) -> Table:
@@ -88,18 +79,15 @@ def metrics_table(comparison: Comparison, label: str) -> Table:
     sides = comparison.baseline, label
     found = [e for e in views[0].values() if any(values[e.measure.name][side].known.size for side in sides)]
 
-    def mean(each: MetricContrast, side: str) -> Cell:
-        measured = values[each.measure.name][side]
-        if measured.mean is None:
-            return Cell("does not apply", "quiet", measured.reason)
-        return Cell(number(measured.mean), below=span(measured.interval) if measured.interval else "")
+    def mean(each: Contrast, side: str) -> Cell:
+        return shown(values[each.measure.name][side])
 
-    def title(each: MetricContrast) -> Cell:
+    def title(each: Contrast) -> Cell:
         follows = abs(each.follows_length or 0.0) >= FOLLOWS and each.measure.name != "length"
         return measure_cell(each.measure, not comparison.unlike, " ↔" if follows else "")
 
-    def tested(each: MetricContrast, shown: Cell | str) -> Cell | str:
-        return shown if each.tested else Cell(DASH, "quiet", each.reason or _UNTESTED)
+    def tested(each: Contrast, shown: Cell | str) -> Cell | str:
+        return shown if each.interval else Cell(DASH, "quiet", each.reason or _UNTESTED)
 
     columns = {
         "metric": title,
@@ -114,13 +102,13 @@ def metrics_table(comparison: Comparison, label: str) -> Table:
     return contrast_table(found, (), f"{label} against {comparison.baseline}", more=columns)
 
 
-def _estimate(each: MetricContrast) -> Cell:
+def _estimate(each: Contrast) -> Cell:
     if each.incomparable:
         return Cell("not comparable", "quiet", each.reason)
     return difference_cell(each, span(each.interval) if each.interval else "")
 
 
-def _at_length(each: MetricContrast) -> Cell:
+def _at_length(each: Contrast) -> Cell:
     if each.measure.name == "length":
         return Cell(DASH, "quiet")
     look = "detected" if each.at_equal_length else ""
@@ -133,7 +121,9 @@ def missing_table(comparison: Comparison) -> Table:
     apart = [each for each in comparison.everything.differences if each.incomparable]
     for metric in METRICS:
         values = comparison.everything.measurements.values[metric.name].items()
-        found = [(label if e.mean is None else f"{label} (some episodes)", e.reason) for label, e in values]
+        found = [
+            (label if e.estimate is None else f"{label} (some episodes)", e.reason) for label, e in values
+        ]
         found += [(f"{e.label} against {e.baseline}", e.reason) for e in apart if e.measure is metric]
         for label, reason in found:
             if reason:

@@ -228,7 +228,7 @@ def _description(root: Path) -> str:
     metrics = [metric for metric in METRICS if not metric.of_dataset]
     values = measure({"": episodes}, np.random.default_rng(0), metrics=metrics).values
     rows = [
-        [metric.title, number(values[metric.name][""].mean), metric.unit or DASH, metric.meaning]
+        [metric.title, number(values[metric.name][""].estimate), metric.unit or DASH, metric.meaning]
         for metric in metrics
         if values[metric.name][""].known.size
     ]

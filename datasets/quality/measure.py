@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,8 @@ from handrail.datasets.quality.scale import Scale
 from handrail.datasets.quality.units import why_not
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply, Episode
 from handrail.datasets.reading.load import each_opened
-from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_mean
+from handrail.datasets.statistics.contrast import Value
+from handrail.datasets.statistics.means import mean_value
 
 FRAMES = 2048  # of a group at most, for what compares every frame with every other
 
@@ -24,38 +24,10 @@ Placed = tuple[Episode, list[tuple[EpisodeSet, int]]]  # an episode, the groups 
 
 
 @dataclass(frozen=True)
-class Measured:
-    """A metric of all episodes of a group."""
-
-    values: FloatArray
-    """`(E,)`; NaN where it does not apply."""
-    interval: Interval | None = None
-    """95 % of the mean, bootstrap; None for fewer than five episodes and for a metric of datasets."""
-    reason: str = ""
-    """The commonest reason why it does not apply; "" where it applies to all."""
-
-    @property
-    def known(self) -> FloatArray:
-        """The values of the episodes to which it applies."""
-        return self.values[np.isfinite(self.values)]
-
-    @property
-    def mean(self) -> float | None:
-        """Over the episodes to which it applies; None without any."""
-        return float(self.known.mean()) if self.known.size else None
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """Its entry in the JSON of a report."""
-        numbers = {"count": len(self.known), "mean": self.mean, "interval": self.interval}
-        return numbers | {"reason": self.reason}
-
-
-@dataclass(frozen=True)
 class Measurements:
     """The metrics of some groups."""
 
-    values: Mapping[str, Mapping[str, Measured]]
+    values: Mapping[str, Mapping[str, Value]]
     """By metric and group."""
     groups: Mapping[str, EpisodeSet]
 
@@ -71,11 +43,11 @@ def measure(
     groups: Groups, rng: np.random.Generator, margin: float = 0.1, metrics: Sequence[Metric] = METRICS
 ) -> Measurements:
     """Return every metric of every episode; see `measure_views`."""
-    return next(measure_views([groups], rng, margin, metrics))
+    return next(measure_views({"": groups}, rng, margin, metrics))
 
 
 def measure_views(
-    views: Sequence[Groups],
+    views: Mapping[str, Groups],
     rng: np.random.Generator,
     margin: float = 0.1,
     metrics: Sequence[Metric] = METRICS,
@@ -83,12 +55,12 @@ def measure_views(
     """Yield the metrics of several ways to choose episodes; one that is in several is read once for all.
 
     Args:
-        views: Groups of episodes.
+        views: Groups of episodes, by title.
         rng: Of intervals and of what is estimated from random batches; drawn from as the views are asked for.
         margin: Distance to keep [m].
         metrics: Which.
     """
-    sets = [{label: EpisodeSet(each) for label, each in groups.items()} for groups in views]
+    sets = [{label: EpisodeSet(each) for label, each in groups.items()} for groups in views.values()]
     for groups in sets:
         _share_scales(list(groups.values()), margin)
     placed = _placed([group for groups in sets for group in groups.values()])
@@ -106,8 +78,11 @@ def measure_views(
         for metric in metrics:
             if not metric.of_dataset:
                 _measure(metric, episode, where)
-    for groups in sets:
-        values = {m.name: {label: _measured(m, each, rng) for label, each in groups.items()} for m in metrics}
+    for title, groups in zip(views, sets, strict=True):
+        values = {
+            each.name: {label: _value(each, label, title, group, rng) for label, group in groups.items()}
+            for each in metrics
+        }
         yield Measurements(values, groups)
 
 
@@ -156,25 +131,24 @@ def _measure(metric: Metric, episode: Demonstration, where: Sequence[tuple[Episo
         group.found.setdefault(metric.name, [np.nan] * len(group.episodes))[place] = known[key]
 
 
-def _measured(metric: Metric, group: EpisodeSet, rng: np.random.Generator) -> Measured:
+def _value(metric: Metric, label: str, scope: str, group: EpisodeSet, rng: np.random.Generator) -> Value:
     if metric.of_dataset:
-        return _of_dataset(metric, group, rng)
+        values, reason = _of_dataset(metric, group, rng)
+        return mean_value(metric, label, values, None, scope=scope, reason=reason)
     found = group.found[metric.name]
     values = np.array([np.nan if isinstance(each, str) else each for each in found])
     reasons = Counter(each for each in found if isinstance(each, str)).most_common(1)
-    known = values[np.isfinite(values)]
-    interval = bootstrap_mean(known, rng) if len(known) >= FEWEST else None
-    return Measured(values, interval, reasons[0][0] if reasons else "")
+    return mean_value(metric, label, values, rng, scope=scope, reason=reasons[0][0] if reasons else "")
 
 
-def _of_dataset(metric: Metric, group: EpisodeSet, rng: np.random.Generator) -> Measured:
-    """Return the mean over the frames of each episode, NaN where it has none."""
+def _of_dataset(metric: Metric, group: EpisodeSet, rng: np.random.Generator) -> tuple[FloatArray, str]:
+    """Return the mean over the frames of each episode, NaN where it has none, and why there are none."""
     count = len(group.episodes)
     try:
         values = metric.measure(group, rng)
     except DoesNotApply as error:
-        return Measured(np.full(count, np.nan), None, str(error))
+        return np.full(count, np.nan), str(error)
     known, owner = np.isfinite(values), group.owner
     counts = np.bincount(owner[known], minlength=count)
     sums = np.bincount(owner[known], weights=values[known], minlength=count)
-    return Measured(np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0))
+    return np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0), ""

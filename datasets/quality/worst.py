@@ -43,7 +43,7 @@ def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]
     if not episodes:
         raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
     measured = measure({"": episodes}, np.random.default_rng(0), metrics=[metric]).values[metric.name][""]
-    if measured.mean is None:
+    if measured.estimate is None:
         raise HandrailError(
             f"--worst {metric.name}: expected a value of an episode, got none: {measured.reason}"
         )

@@ -6,18 +6,18 @@ the same value, corrected for the number of tests in the same way.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
+from handrail.controllers.arrays import FloatArray
 from handrail.datasets.statistics.resampling import Interval
 
 LEVEL = 0.05  # below which a p that is adjusted for their number counts
 POWER = 0.8
 SHARE, RATIO = "share", "ratio"  # units that are shown as percentage points, and as a factor
-_COMPARED = ("view", "metric", "unit", "group", "baseline", "does_not_apply")
-_NUMBERS = (
+_OF_CSV = (
     "estimate",
     "interval",
     "spread",
@@ -27,7 +27,8 @@ _NUMBERS = (
     "at_length_interval",
     "follows_length",
 )
-_HIDDEN = ("measure", "scope", "label", "baseline", "family", "reason", "incomparable", "largest", "null")
+_HIDDEN = ("measure", "scope", "label", "values", "incomparable", "largest", "null", "reason")
+_NO_SPREAD = 1e-9  # of a value: a standard deviation below is rounding
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Estimate:
 
     estimate: float | None = None
     interval: Interval | None = None  # 95 %
+    nested: Interval | None = None  # 95 % with the training of policies drawn anew, too, where that is known
     p: float | None = None  # two-sided, of there being no difference
     counts: tuple[
         int, ...
@@ -63,22 +65,60 @@ class Estimate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contrast(Estimate):
-    """A measure under a condition minus the same under the baseline."""
+class Value(Estimate):
+    """A measure under one condition, over its units: episodes, participants, trained policies, draws."""
 
     measure: Measure
-    label: str
-    baseline: str = ""
+    label: str  # of the condition
     scope: str = ""  # which episodes, task or tasks
+    values: FloatArray = field(
+        default_factory=lambda: np.empty(0), compare=False
+    )  # of each unit; NaN where it has none
+    reason: str = ""  # why there is none, the commonest if several
+
+    @property
+    def known(self) -> FloatArray:
+        """The values that are there."""
+        return self.values[np.isfinite(self.values)]
+
+    @property
+    def widest(self) -> Interval | None:
+        """The interval that holds for policies trained anew, too, if it is known."""
+        return self.nested or self.interval
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """What it is of, for JSON and CSV."""
+        names = {"view": self.scope, "metric": self.measure.name, "unit": self.measure.unit}
+        return names | {"group": self.label}
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The entry in the JSON of every report."""
+        numbers = (each.name for each in fields(self) if each.name not in _HIDDEN)
+        reason = {"does_not_apply": self.reason}
+        return self.named | reason | {name: getattr(self, name) for name in numbers}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contrast(Value):
+    """A measure under a condition minus the same under the baseline.
+
+    Of a metric whose unit is the dataset there is an estimate alone: the values of its episodes share
+    neighbours, and resampling would take them for independent.
+    """
+
+    baseline: str = ""
     family: str = ""  # of tests that p is adjusted for, declared before anything is known of the results
-    nested: Interval | None = None  # 95 % with the training of policies drawn anew, too, where that is known
     p_adjusted: float | None = None  # by Holm over the family; None where nothing is tested
     tests: int = 1  # in the family
     null: float = 0.0  # no difference: 1 for a ratio
-    reason: str = ""  # why there is no difference to speak of
-    sides: tuple[float, float] | None = (
-        None  # means of what is added and taken off, of more than two conditions
-    )
+    sides: tuple[float, float] | None = None  # means of what is added and taken off, of several conditions
+    incomparable: str = ""  # why the units of both are not known to be the same, where both have values
+    spread: float | None = None  # standard deviation within groups, pooled
+    at_length: float | None = None  # estimate without the linear dependence on length, within groups
+    at_length_interval: Interval | None = None  # 95 %, bootstrap
+    follows_length: float | None = None  # Spearman's ρ with episode length within groups
 
     @property
     def detected(self) -> bool:
@@ -89,17 +129,28 @@ class Contrast(Estimate):
         return self.p_adjusted < LEVEL and not any(low <= self.null <= high for low, high in intervals)
 
     @property
+    def at_equal_length(self) -> bool:
+        """Whether what was detected, in its direction, is also there at equal length."""
+        low, high = self.at_length_interval or (0.0, 0.0)
+        return self.detected and (low > 0.0 if (self.estimate or 0.0) > 0.0 else high < 0.0)
+
+    @property
     def seen(self) -> float | None:
         """The difference that such an experiment detects in 80 % of all cases, for so many tests."""
         return self.detectable(self.tests)
 
     @property
+    def effect(self) -> tuple[float, ...]:
+        """Estimate and interval in standard deviations; infinite for a difference where nothing varies."""
+        values = (self.estimate or 0.0, *(self.interval or (0, 0)))
+        return tuple(_in_spreads(each, self.spread or 0.0) for each in values)
+
+    @property
     def row(self) -> dict[str, Any]:
         """What the CSV of every report has: what is compared, and its numbers, an interval in two columns."""
-        values = self.scope, self.measure.name, self.measure.unit, self.label, self.baseline, self.reason
-        found: dict[str, Any] = dict(zip(_COMPARED, values, strict=True))
-        for name in _NUMBERS:
-            value = getattr(self, name, None)
+        found = self.named | {"baseline": self.baseline, "does_not_apply": self.reason}
+        for name in _OF_CSV:
+            value = getattr(self, name)
             if name.endswith("interval"):
                 found[f"{name}_low"], found[f"{name}_high"] = value or (None, None)
             else:
@@ -108,13 +159,20 @@ class Contrast(Estimate):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What the JSON of every report has: what is compared, and all that is known of it."""
-        values = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _HIDDEN}
-        named = {"view": self.scope, "metric": self.measure.name, "unit": self.measure.unit}
-        named |= {"group": self.label, "baseline": self.baseline, "family": self.family}
-        if self.reason:
-            return named | {"does_not_apply": self.reason}
-        return named | values | {"detected": self.detected, "detectable": self.seen}
+        """The entry in the JSON of every report."""
+        return super().content | {"detected": self.detected, "detectable": self.seen}
+
+
+def contrast(one: Value, other: Value, found: Estimate, **more: Any) -> Contrast:
+    """Return how a measure differs between two conditions, by what was found of that."""
+    names = {"measure": one.measure, "label": one.label, "baseline": other.label, "scope": one.scope}
+    return Contrast(**names | vars(found) | more)
+
+
+def _in_spreads(value: float, spread: float) -> float:
+    if spread > _NO_SPREAD * abs(value):
+        return value / spread
+    return float(np.copysign(np.inf, value)) if value else 0.0
 
 
 def adjusted[C: Contrast](contrasts: Iterable[C]) -> list[C]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from handrail.datasets.comparison.figures import draw_values
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, rows, tidy
 from handrail.datasets.statistics.contrast import Contrast
 from handrail.policies.study.contrasts import DECLARED
@@ -80,11 +81,7 @@ def _answer(tasks: Sequence[str], results: Results) -> Any:
     figure, panels = _panels(tasks, 1.2 + 0.4 * max(len(results.of_task(task)) for task in tasks))
     for axes, task in panels:
         styles = [_style(each, results) for each in results.of_task(task)]
-        for row, (each, style) in enumerate(zip(results.of_task(task), styles, strict=True)):
-            axes.plot(np.multiply(100, each.interval), [row, row], color=style["color"], lw=1.6)
-            shares = [100 * share for share in each.shares.values()]
-            axes.plot(shares, np.full(len(shares), row + 0.26), "|", color=style["color"], ms=6)
-            axes.plot(100 * (each.success.estimate or 0.0), row, ms=7, mec="white", **style)
+        draw_values(axes, [each.value for each in results.of_task(task)], styles, 100.0)
         axes.set(xlabel="policy success [%]", xlim=(-3, 103), ylim=(len(styles) - 0.4, -0.6))
         axes.set(yticks=range(len(styles)), yticklabels=[style["label"] for style in styles])
         tidy(axes, "x")
@@ -125,8 +122,8 @@ def _robustness(tasks: Sequence[str], results: Results) -> Any:
             shown = [found for name in names if (found := results.find(task, label, name))]
             shift = 0.5 * ((place + 0.5) / len(labels) - 0.5)
             xs = [names.index(each.treatment) + shift for each in shown]
-            values = np.array([each.success.estimate for each in shown])
-            errors = np.abs(np.array([each.interval for each in shown]).T - values) * 100
+            values = np.array([each.value.estimate for each in shown])
+            errors = np.abs(np.array([each.value.interval for each in shown]).T - values) * 100
             style = _style(shown[0], results) | {"ls": "", "elinewidth": 1.2, "ms": 5}
             axes.errorbar(xs, 100 * values, yerr=errors, **style)
         axes.set(xticks=range(len(names)), ylim=(-3, 103))

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.versions import SIMULATION, versions
-from handrail.datasets.comparison.report import Report
+from handrail.datasets.comparison.report import Report, sentence
 from handrail.datasets.presentation.drawing import png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.markup import panels
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.presentation.wording import points, points_span
 from handrail.datasets.statistics.contrast import Contrast
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.imitation.training.plateau import Plateau
@@ -69,7 +68,7 @@ def _report(
     return Report(
         title=f"Study {design.name}: {', '.join(design.modes)}",
         headline=" ".join(answer(found, design)),
-        cautions=cautions(results),
+        limits=cautions(results),
         sections=[
             ("Figures", [panels(shown, "wide")]),
             ("Contrasts", tables.of_contrasts(found, results)),
@@ -78,6 +77,7 @@ def _report(
         ],
         how=f"{_HOW} {plan(design)}",
         content=_content(config, results, found),
+        values=[each.value for each in results.conditions.values()],
         contrasts=found,
     )
 
@@ -141,16 +141,11 @@ def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
 
 
 def _told(each: Contrast) -> str:
-    name, interval = f"{each.label[:1].upper()}{each.label[1:]}", each.interval
-    if interval is None:
-        return f"{name}: {points(each.estimate)} points; one draw tests nothing."
-    seen = f"{'a' if each.detected else 'no'} difference detected"
-    verdict = "not tested before all draws are done" if each.p_adjusted is None else seen
-    return f"{name}: {points(each.estimate)} points (95 % {points_span(interval)}), {verdict}."
+    return sentence(each, f"{each.label[:1].upper()}{each.label[1:]}")
 
 
-def cautions(results: Results) -> list[str]:
-    """Return what stands in the way of reading the results as they are meant."""
+def cautions(results: Results) -> dict[str, object]:
+    """Return what stands in the way of reading the results as they are meant, and whether it does."""
     progress, design = results.progress, results.progress.design
     seen = [each["digest"] for each in designs(progress.layout)]
     again = [
@@ -158,26 +153,22 @@ def cautions(results: Results) -> list[str]:
         for job in progress.jobs
         if "digest_before" in progress.note(job).get("result", {}) and not job.policy
     ]
-    trained = [
+    capped = sum(
         _capped(each, design, condition.task)
         for condition in results.conditions.values()
         if not condition.treatment
         for each in results.trained(condition)
-    ]
-    missing, capped = len(progress.missing), sum(trained)
-    known = [
-        (True, _LIMITS),
-        (design.draws < 2, "One draw does not say how much another recording would differ."),
-        (missing > 0, f"{missing} of {len(progress.jobs)} jobs are not done yet: study.json names them."),
-        (
-            bool({*seen} - {design.digest}),
-            "The design was changed after the study began. Digests, in order:"
-            f" {', '.join(seen)}; this report is of {design.digest}.",
-        ),
-        (bool(again), f"Recorded again, and the rows were others than before: {', '.join(again)}."),
-        (capped > 0, f"Policies that ended with the most updates, before their loss was flat: {capped}."),
-    ]
-    return [text for holds, text in known if holds]
+    )
+    missing, jobs = len(progress.missing), len(progress.jobs)
+    return {
+        _LIMITS: True,
+        "One draw does not say how much another recording would differ.": design.draws < 2,
+        f"{missing} of {jobs} jobs are not done yet: study.json names them.": missing,
+        "The design was changed after the study began. Digests, in order:"
+        f" {', '.join(seen)}; this report is of {design.digest}.": {*seen} - {design.digest},
+        f"Recorded again, and the rows were others than before: {', '.join(again)}.": again,
+        f"Policies that ended with the most updates, before their loss was flat: {capped}.": capped,
+    }
 
 
 def _capped(result: Mapping[str, Any], design: StudyDesign, task: str) -> bool:

@@ -10,10 +10,9 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.evaluations import Condition, Policy, Rollout, read_evaluations
-from handrail.datasets.statistics.contrast import SHARE, Estimate, Measure
+from handrail.datasets.statistics.contrast import SHARE, Measure, Value
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.replicates import student, variance_of_share
-from handrail.datasets.statistics.resampling import Interval
 from handrail.policies.study.jobs import StudyPolicy
 from handrail.policies.study.progress import StudyProgress
 
@@ -58,18 +57,13 @@ class StudyCondition(Condition):
         return variance_of_share(together.sum(), len(together), round(len(together) / len(self.policies)))
 
     @cached_property
-    def success(self) -> Estimate:
-        """Mean over draws."""
-        return student(list(self.shares.values()), self.least())
-
-    @property
-    def interval(self) -> Interval:
-        """95 % of the success: Student's t over draws; of a single one Wilson's, for this very policy."""
-        if self.success.interval:
-            low, high = self.success.interval
-            return max(0.0, low), min(1.0, high)
-        values = self.rolled()
-        return wilson(float(values.sum()), len(values))
+    def value(self) -> Value:
+        """Success: mean over draws, 95 % by Student's t; of a single draw Wilson's, for this very policy."""
+        found, rolled = student(list(self.shares.values()), self.least()), self.rolled()
+        low, high = found.interval or wilson(float(rolled.sum()), len(rolled))
+        named: dict[str, Any] = vars(found) | {"interval": (max(0.0, low), min(1.0, high))}
+        label, values = f"{self.label} {self.treatment}".strip(), np.array(list(self.shares.values()))
+        return Value(**named, measure=MEASURES["success"], label=label, scope=self.task, values=values)
 
     def rolled(self, measure: str = "success") -> FloatArray:
         """Return one measure of all rollouts."""
@@ -101,8 +95,6 @@ class StudyCondition(Condition):
             "task": self.task,
             "label": self.label,
             "treatment": self.treatment,
-            "success": vars(self.success),
-            "interval": self.interval,
             "draws": self.shares,
             "successes": int(self.rolled().sum()),
             "rollouts": len(self.rolled()),

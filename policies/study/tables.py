@@ -65,8 +65,8 @@ def _condition(each: StudyCondition, results: Results) -> tuple[str, ...]:
     steps, touched = sorted(one["steps"] for one in learnt), each.rolled("contact")
     return (
         each.label,
-        percent(each.success.estimate),
-        wording.percent_span(each.interval),
+        percent(each.value.estimate),
+        wording.percent_span(each.value.interval),
         ", ".join(f"{100 * share:.0f}" for share in each.shares.values()),
         f"{touched.sum():.0f} of {len(touched)}",
         percent(float(each.rolled("clean").mean())),

@@ -32,7 +32,7 @@ def summary(root: Path, seed: int) -> dict[str, Any]:
     """Return how much was recorded, how it ended, how good it is, and a digest; `seed` is the metrics'."""
     episodes = recorded_episodes(root)
     measured = measure({"all": episodes}, np.random.default_rng(seed)).values
-    means = {name: each["all"].mean for name, each in measured.items()}
+    means = {name: each["all"].estimate for name, each in measured.items()}
     failed = (episode.meta.get("failure_reason") for episode in episodes if not episode.success)
     return {
         "episodes": len(episodes),

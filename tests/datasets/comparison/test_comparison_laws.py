@@ -58,7 +58,7 @@ def group(label, count, generator, **meta):
 
 def compared(groups, generator):
     measured = measure({each.label: each.episodes for each in groups}, generator, metrics=METRICS)
-    return measured, differences("all", groups, measured, groups[-1].label, generator)
+    return measured, differences(groups, measured, groups[-1].label, generator)
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_more_episodes_of_the_same_are_no_difference(quick, counts):
         told = [each for each in found if each.measure.of_dataset]
         assert [each.measure for each in told] == OF_GROUP
         for each in told:
-            assert (each.tested, each.p, each.p_adjusted) == (False, None, None)
+            assert (each.interval, each.p, each.p_adjusted) == (None, None, None)
             assert bool(each.reason) == (counts[0] != counts[1])
 
 
@@ -86,7 +86,7 @@ def test_what_is_not_tested_costs_no_power(quick):
     """Holm's family is what has a p: as many as there are differences of single episodes."""
     generator = rng(3)
     _, found = compared([group("a", 12, generator), group("b", 12, generator)], generator)
-    tested = [each for each in found if each.tested]
+    tested = [each for each in found if each.interval]
     assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
 
 
@@ -118,7 +118,7 @@ def test_frames_of_episodes(most):
 def test_the_success_that_is_shown_is_the_one_that_is_tested():
     one = group("a", 12, rng(6), success=True, attempts=3)
     other = group("b", 10, rng(7), success=False)
-    assert (collected(one).success, collected(other).success) == (1.0, 0.0)
+    assert tuple(collected(each, "")[0].estimate for each in (one, other)) == (1.0, 0.0)
     assert success_difference(one, other).estimate == 1.0
 
 
@@ -191,9 +191,9 @@ def test_an_interval_over_scenes_covers(quick, hard):
     for _ in range(200):
         difficulty = hard * generator.choice([-1.0, 1.0], size=60)
         found = condition_of("a", 0.5, 3, generator, scenes=60, difficulty=difficulty)
-        (outcome,) = judge({"a": found}, "a", generator).conditions
-        covered += outcome.wilson[0] <= 0.5 <= outcome.wilson[1]
-        low, high = wilson(outcome.successes, outcome.rollouts)
+        outcome = judge({"a": found}, "a", generator).successes["a"]
+        covered += outcome.interval[0] <= 0.5 <= outcome.interval[1]
+        low, high = wilson(found.successes, len(found.rollouts))
         naive += low <= 0.5 <= high
     assert covered >= 182
     assert hard == 0.0 or naive < 170

@@ -12,11 +12,17 @@ from datasets_helpers import create
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.people import FORMS, compare_people, compared, contrast
+from handrail.datasets.comparison.people import (
+    FORMS,
+    compare_people,
+    compared,
+    paired_by_scene,
+    people_report,
+)
 from handrail.datasets.comparison.scores import DEMO, SCORES, read_scores
 from handrail.datasets.comparison.user_study import Trial
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.statistics.contrast import adjusted, holm
+from handrail.datasets.statistics.contrast import LEVEL, holm
 from handrail.datasets.statistics.resampling import bootstrap_mean
 
 FPS = 30
@@ -90,9 +96,9 @@ def people(count, frames, success=True, scene=7):
 SLOWER = (12, 3, 9, 15, 6, 21)  # frames by which each participant is slower with `direct`
 
 
-def found(part, measure, label):
-    (each,) = [each for each in part.contrasts if (each.measure.name, each.label) == (measure, label)]
-    return each
+def of(found, scope, measure):
+    """Return the values or contrasts of a measure by label."""
+    return {each.label: each for each in found if (each.scope, each.measure.name) == (scope, measure)}
 
 
 def rng():
@@ -114,8 +120,7 @@ def six(tmp_path_factory):
 
 
 def test_a_difference_is_taken_within_participants(six):
-    task = six[1].parts[0]
-    times = found(task, "completion_time", "direct")
+    times = of(six[1].contrasts, "reach", "completion_time")["direct"]
     assert times.counts == (6,)
     assert times.estimate == pytest.approx(np.mean(SLOWER) / FPS)
     low, high = times.interval
@@ -126,22 +131,22 @@ def test_p_is_that_of_all_swaps_of_signs(six):
     each = np.array(SLOWER) / FPS
     swapped = [np.mean(each * signs) for signs in itertools.product((-1, 1), repeat=6)]
     exact = np.mean(np.abs(swapped) >= each.mean() - 1e-12)
-    task = six[1].parts[0]
-    times = found(task, "completion_time", "direct")
+    times = of(six[1].contrasts, "reach", "completion_time")["direct"]
     assert times.p == pytest.approx(exact)
-    tested = [each for each in task.contrasts if each.p is not None]
+    tested = [each for each in six[1].contrasts if each.scope == "reach" and each.p is not None]
     assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
 
 
 def test_what_cannot_be_detected_is_said(six):
-    assert any("Too few to detect any difference" in text for text in six[1].cautions)
-    assert not any(each.detected for each in six[1].parts[0].contrasts)
+    assert any("Too few to detect any difference" in text for text in people_report(six[1]).cautions)
+    assert not any(each.detected for each in six[1].contrasts if each.scope == "reach")
     nine = {f"P{n}": {None: [float(n)]} for n in range(9)}
     more = {name: {None: [50.0 + value[None][0] ** 2]} for name, value in nine.items()}
-    alone = contrast(SCORES[0], "a", "b", more, nine, rng())
+    alone = paired_by_scene(more, nine, rng())
     assert alone.p == pytest.approx(2.0**-8)
-    assert adjusted([alone])[0].detected
-    same = contrast(SCORES[0], "a", "b", nine, nine, rng())
+    assert alone.p < LEVEL
+    assert alone.interval[0] > 0
+    same = paired_by_scene(nine, nine, rng())
     assert (same.estimate, same.interval, same.p) == (0.0, (0.0, 0.0), None)
 
 
@@ -152,35 +157,36 @@ def test_participants_are_what_is_resampled():
         for name, scenes in many.items()
         for scene, (value,) in scenes.items()
     ]
-    (means,) = compared("go", SCORES[2:], trials, ["ee"], "ee", 5, rng()).means["sus"]
+    (means,), _ = compared("go", SCORES[2:], trials, ["ee"], "ee", list(many), rng())
     assert means.interval == pytest.approx(bootstrap_mean(np.arange(5.0), rng()))
 
 
 def test_scenes_that_only_one_condition_has_do_not_count(six):
     one = {"P1": {1: [5.0], 2: [100.0]}}
     other = {"P1": {1: [3.0], 3: [0.0]}}
-    assert contrast(SCORES[0], "a", "b", one, other, rng()).estimate == 2.0
+    assert paired_by_scene(one, other, rng()).estimate == 2.0
     apart = {"P1": {4: [1.0], 5: [3.0]}}
-    assert contrast(SCORES[0], "a", "b", one, apart, rng()).estimate == pytest.approx(52.5 - 2.0)
+    assert paired_by_scene(one, apart, rng()).estimate == pytest.approx(52.5 - 2.0)
 
 
 def test_two_participants_have_no_interval_and_a_sentence(tmp_path):
     data = {("reach", mode): people(2, lambda place: 40 + place) for mode in ("direct", "ee")}
     root = study(tmp_path / "two", data)
     comparison = compare_people(CompareConfig(study=str(root)))
-    numbers = [mean.interval for part in comparison.parts for means in part.means.values() for mean in means]
-    assert not any(numbers)
-    assert all(each.interval is each.p is each.p_adjusted is None for each in comparison.parts[0].contrasts)
-    assert "Participants: 2. Intervals and tests need 5 or more, so there are none." in comparison.cautions
+    assert not any(each.interval for each in comparison.values)
+    assert all(each.interval is each.p is each.p_adjusted is None for each in comparison.contrasts)
+    assert (
+        "Participants: 2. Intervals and tests need 5 or more, so there are none."
+        in people_report(comparison).cautions
+    )
 
 
 def test_a_missing_score_is_missing_and_counted(six):
-    forms = six[1].parts[-1]
-    assert forms.title == FORMS
-    (sus,) = [mean for mean in forms.means["sus"] if mean.label == "ee"]
-    assert (sus.counts, sus.total, sus.estimate) == ((5,), 6, pytest.approx(83.0))
-    assert found(forms, "sus", "direct").estimate == pytest.approx(-33.0)
-    assert all(mean.estimate is None and mean.counts == (0,) for mean in forms.means["tlx_raw"])
+    sus = of(six[1].values, FORMS, "sus")["ee"]
+    assert (sus.counts, len(sus.values), sus.estimate) == ((5,), 6, pytest.approx(83.0))
+    assert of(six[1].contrasts, FORMS, "sus")["direct"].estimate == pytest.approx(-33.0)
+    raw = of(six[1].values, FORMS, "tlx_raw").values()
+    assert all(mean.estimate is None and mean.counts == (0,) for mean in raw)
     assert "missing" in command("--study", six[0], "--output", six[0] / "out", name="compare").stdout
 
 
@@ -188,14 +194,16 @@ def test_scripted_operators_stand_beside_people_and_are_not_tested(six, tmp_path
     episodes = [("", scene, 30, True) for scene in range(5)]
     beside = dataset(tmp_path / "scripts", "reach", "ee", episodes, operator="scripted")
     comparison = compare_people(CompareConfig(datasets=(str(beside),), study=str(six[0]), baseline="ee"))
-    task = comparison.parts[0]
-    labels = [(mean.label, mean.scripted, *mean.counts) for mean in task.means["completion_time"]]
-    assert labels == [("direct", False, 6), ("ee", False, 6), ("ee", True, 5)]
-    before = [(each.label, each.estimate) for each in six[1].parts[0].contrasts]
-    assert [(each.label, each.estimate) for each in task.contrasts] == before
-    assert any(text.startswith("Scripted operators stand beside") for text in comparison.cautions)
-    assert task.means["undos"][2].estimate is None  # nobody held a device
-    assert task.means["undos"][1].estimate == 1.0
+    times = of(comparison.values, "reach", "completion_time").values()
+    counts = [(mean.label, *mean.counts) for mean in times]
+    assert counts == [("direct", 6), ("ee", 6), ("ee, scripted", 5)]
+    before = [(each.label, each.estimate) for each in six[1].contrasts]
+    assert [(each.label, each.estimate) for each in comparison.contrasts] == before
+    told = people_report(comparison).cautions
+    assert any(text.startswith("Scripted operators stand beside") for text in told)
+    undos = of(comparison.values, "reach", "undos")
+    assert undos["ee, scripted"].estimate is None  # nobody held a device
+    assert undos["ee"].estimate == 1.0
 
 
 def test_people_are_no_scripts(six):
@@ -228,7 +236,7 @@ def test_scores_that_say_so_make_it_demo_data(tmp_path):
     write_scores(root, ["participant,condition,score,value,source", f"P1,ee,tlx_raw,,{DEMO}"])
     comparison = compare_people(CompareConfig(study=str(root)))
     assert comparison.study.demo
-    assert comparison.parts[-1].means["tlx_raw"][0].counts == (0,)
+    assert of(comparison.values, FORMS, "tlx_raw")["ee"].counts == (0,)
 
 
 WRONG = {

@@ -65,7 +65,7 @@ def test_intervals_over_three_seeds_are_as_wide_as_t():
     low, high = t_interval(0.4, error, freedom)
     assert found.differences[0].nested == pytest.approx((low, high), abs=1e-6)
     assert high - low == pytest.approx(2 * stats.t.ppf(0.975, freedom) * error)
-    assert found.conditions[0].nested == pytest.approx((0.7 - 4.3027 * 0.2 / np.sqrt(3), 1.0), abs=1e-4)
+    assert found.successes["a"].nested == pytest.approx((0.7 - 4.3027 * 0.2 / np.sqrt(3), 1.0), abs=1e-4)
 
 
 def test_an_interval_over_three_seeds_covers():
@@ -75,7 +75,7 @@ def test_an_interval_over_three_seeds_covers():
         shares = np.clip(0.5 + 0.15 * generator.normal(size=3), 0.0, 1.0)
         values = [(generator.random(50) < share).astype(float) for share in shares]
         found = [Run(0, place, tuple(range(50)), each) for place, each in enumerate(values)]
-        (found,) = judge({"a": condition("a", found)}, "a", generator).conditions
+        found = judge({"a": condition("a", found)}, "a", generator).successes["a"]
         covered += found.nested[0] <= 0.5 <= found.nested[1]
     assert covered >= 182
 

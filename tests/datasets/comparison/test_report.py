@@ -10,7 +10,6 @@ from figure_helpers import drawn_numbers, shows
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.episodes import MetricContrast
 from handrail.datasets.comparison.figures import (
     answer_panels,
     draw_effect,
@@ -24,6 +23,7 @@ from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.comparison.tables import collection_differences_table
 from handrail.datasets.presentation.drawing import new_figure
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.statistics.contrast import Contrast
 
 LENGTH, DISTANCE = (next(m for m in METRICS if m.name == name) for name in ("length", "smallest_distance"))
 LONG = ("a robot steered by the hand through the controller", "a robot steered joint by joint, unprotected")
@@ -58,7 +58,7 @@ def _another(groups):
 
 def contrast(metric, estimate, low, high, spread=1.0, **more):
     names = {"measure": metric, "label": "a", "baseline": "b"}
-    return MetricContrast(**names, estimate=estimate, interval=(low, high), spread=spread, **more)
+    return Contrast(**names, estimate=estimate, interval=(low, high), spread=spread, **more)
 
 
 def drawn(metric, estimate, low, high, spread=1.0, sign=1.0):
@@ -95,12 +95,14 @@ def test_right_is_better():
 def test_figures_show_what_was_measured(alike):
     everything = alike.everything
     (first, _) = answer_panels(alike)
-    assert shows(first.figure, [100 * each.successes / each.episodes for each in everything.collected])
+    assert shows(
+        first.figure, [100 * group.successes / len(group.episodes) for group in everything.collected]
+    )
     for panel, metric in zip(metrics_panels(alike), shown_metrics(alike), strict=True):
         for found in everything.measurements.values[metric].values():
             if found.known.size:
-                assert shows(panel.figure, [found.mean, *found.known])
-    tested = [each for each in everything.differences if each.tested]
+                assert shows(panel.figure, [found.estimate, *found.known])
+    tested = [each for each in everything.differences if each.interval]
     near = [abs(each.effect[0]) for each in tested if abs(each.effect[0]) < 4.0]
     pictures = np.abs(np.concatenate([drawn_numbers(panel.figure) for panel in effects_panels(alike)]))
     assert near
@@ -124,7 +126,7 @@ def test_metrics_are_turned_so_that_right_is_better(alike):
         assert axes.xaxis_inverted() == ("↓" in panel.title)
     turned_round = {panel.title.split(" ↓")[0] for panel in metrics_panels(alike) if "↓" in panel.title}
     applied = {
-        m.title for m in METRICS if alike.everything.measurements.values[m.name][LONG[0]].mean is not None
+        m.title for m in METRICS if alike.everything.measurements.values[m.name][LONG[0]].estimate is not None
     }
     assert turned_round == applied & {metric.title for metric in METRICS if metric.good == "lower"}
 
@@ -160,8 +162,8 @@ def test_the_headline_has_the_numbers_of_the_tables(ours):
             comparison
         ).rows
         assert (name, str(difference)) == (f"{other} against {base}", f"{share:+d} points".replace("-", "−"))
-        assert f"difference {interval} points" in success
-        assert f"ratio {ratios}" in hourly
+        assert f"{difference} (95 % {interval})" in success
+        assert f"{ratio} (95 % {ratios})" in hourly
         for cell, said in ((difference, success), (ratio, hourly)):
             assert getattr(cell, "look", "") == ("detected" if ", a difference detected" in said else "")
         low, high = comparison.collecting[1].interval or (np.nan, np.nan)
@@ -173,7 +175,9 @@ def test_policies_come_first_and_the_page_names_their_family(ours, tmp_path):
     for base, sign in (("quick", "−"), ("slow", "+")):
         comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
         said = headline(comparison)
-        assert re.match(rf"Success of policies: .*; difference \{sign}\d+ to \{sign}\d+ points", said)
+        assert re.match(
+            rf"Success of policies: .*; \{sign}\d+ points \(95 % \{sign}\d+ to \{sign}\d+\)", said
+        )
         assert said.endswith("detected.")
     page = dataset_report(comparison).html
     assert page.index(said) < page.index("1 like-for-like")

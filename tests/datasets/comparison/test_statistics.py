@@ -152,7 +152,8 @@ def test_a_clear_difference_is_detected_and_chance_is_not():
     assert clear.paired
     assert clear.nested[1] < 0
     assert clear.p <= clear.p_adjusted
-    assert outcomes.conditions[0].means["contacts"][0] == pytest.approx(0.5)
+    assert outcomes.values[1].measure.name == "contacts"
+    assert outcomes.values[1].estimate == pytest.approx(0.5)
 
 
 def test_training_seeds_are_not_taken_for_a_difference_of_data():
@@ -175,7 +176,7 @@ def test_one_training_seed_says_nothing_of_training():
     outcomes = judged(a=[0.9], b=[0.5])
     (difference,) = outcomes.differences
     assert difference.nested is None
-    assert outcomes.conditions[0].nested is None
+    assert outcomes.successes["a"].nested is None
 
 
 def test_two_training_seeds_are_too_few_where_they_differ_much():
