@@ -11,14 +11,9 @@ from command_helpers import command
 from datasets_helpers import create
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison import people as comparing
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.people import (
-    FORMS,
-    compare_people,
-    compared,
-    paired_by_scene,
-    people_report,
-)
+from handrail.datasets.comparison.people import FORMS, compare_people, paired_by_scene, people_report
 from handrail.datasets.comparison.scores import DEMO, SCORES, read_scores
 from handrail.datasets.comparison.user_study import Trial
 from handrail.datasets.format.schema import Feature
@@ -157,7 +152,7 @@ def test_participants_are_what_is_resampled():
         for name, scenes in many.items()
         for scene, (value,) in scenes.items()
     ]
-    (means,), _ = compared("go", SCORES[2:], trials, ["ee"], "ee", list(many), rng())
+    (means,), _ = comparing.compared("go", SCORES[2:], trials, ["ee"], "ee", list(many), rng())
     assert means.interval == pytest.approx(bootstrap_mean(np.arange(5.0), rng()))
 
 
