@@ -15,7 +15,7 @@ from handrail.controllers.ocp.residuals import StageResiduals
 
 NOTHING_ACTIVE = np.arange(SLACKS)  # only the slacks are at rest: none is negative
 _PHASES = ("distances", "residuals", "solve")
-_WORK = 7e3  # of all QPs of an update for each variable, counted as core/active_set.c does
+_WORK = 3e7  # of all QPs of an update, counted as core/active_set.c does: some 20 ms
 
 
 class RealTimeSolver:
@@ -37,9 +37,9 @@ class RealTimeSolver:
     def solve(self, problem: Problem, guess: FloatArray, active: IntArray = NOTHING_ACTIVE) -> Plan:
         """Return the plan after one step from a guess; its `solved` says whether it is one.
 
-        Right after the intent or the scene has jumped, the guess is far off; a step that did not lead where
-        its linearisation said is followed by another. The work of an update is bounded: the plan reached
-        when it is spent is certified like any other.
+        Right after the intent or the scene has jumped, the guess is far off; a step that is still large, and
+        did not lead where its linearisation said, is followed by another. The work of an update is bounded:
+        the plan reached when it is spent is certified like any other.
 
         Args:
             problem: of this update.
@@ -48,7 +48,7 @@ class RealTimeSolver:
         """
         core = self._asked(problem, guess)
         core.active[: len(active)] = active
-        core.fields.active_rows, core.fields.work = len(active), _WORK * core.fields.M
+        core.fields.active_rows, core.fields.work = len(active), _WORK
         functions().solve_update(core, problem.collision.memory)
         problem.collision.check()
         slacks = core.slacks.tolist()
