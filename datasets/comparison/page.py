@@ -17,7 +17,7 @@ from handrail.datasets.presentation.drawing import Panel, svg
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, duration, number, percent, percent_span, span
 
-FORMAT = "handrail.comparison/3"
+FORMAT = "handrail.comparison/4"
 _REST = "The report has every metric, also where no difference was detected: that does not mean equal."
 _HOW = (
     "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"

@@ -38,7 +38,7 @@ from handrail.datasets.statistics.contrast import (
 from handrail.datasets.statistics.means import mean_value
 from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, difference_of_means, permutation_p
 
-FORMAT = "handrail.people/2"
+FORMAT = "handrail.people/3"
 FORMS = "workload and usability"
 _MEANS = "Means over participants; 95 % below, by resampling participants; n: who has a value, of all."
 _CONTRASTS = "Differences within participants; p after Holm over this table; bold: detected."

@@ -39,7 +39,7 @@ _HOW = (
     " explore, and no interval is adjusted. A system claim compares a policy and a controller with the best"
     " of the unprotected policies in this very measure, chosen afterwards, which is in its favour."
 )
-_FORMAT = "handrail.study/4"
+_FORMAT = "handrail.study/5"
 
 
 def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:

@@ -75,7 +75,7 @@ def test_more_episodes_of_the_same_are_no_difference(quick, counts):
         groups = [group(label, count, generator) for label, count in zip("ab", counts, strict=True)]
         _, found = compared(groups, generator)
         assert not any(each.detected for each in found)
-        told = [each for each in found if each.measure.of_dataset]
+        told = [each for each in found if each.measure in OF_GROUP]
         assert [each.measure for each in told] == OF_GROUP
         for each in told:
             assert (each.interval, each.p, each.p_adjusted) == (None, None, None)
