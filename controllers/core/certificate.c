@@ -7,7 +7,8 @@
 #define HARD_ERROR 1e-4 /* the same where a thing that stands is nearer than its hard limit [m] */
 #define HARD 0.5        /* hard limit of the robot with itself and with what stands, as a share of the least */
 #define BEYOND 0.01     /* of its range that a joint may come to rest [m, rad] */
-#define SAMPLES 4       /* of a stop, and of the waiting after it */
+#define MOST_SAMPLES 128 /* of a stop, and of the waiting after it */
+#define SPACING 0.5     /* of samples, as a share of the least distance, on the way of a pair */
 
 /* Along a path, (count, 2): distances are measured where they can come below the least. */
 void path_violations(Scene *s, int64_t count, const double *path, const double *times, double *violations) {
@@ -31,30 +32,47 @@ void path_violations(Scene *s, int64_t count, const double *path, const double *
   }
 }
 
+/* Samples of a full stop and the waiting after it: so many that no pair which may come below its least distance goes
+   farther from one to the next than a share of that; a stop goes twice as fast at first as on average. */
+static int samples(const Scene *s, double delay, double longest, double span) {
+  double most = 1.0;
+  for (int64_t p = 0; p < s->P; p++) {
+    double way = 0.0, passed = s->speed[p] * LARGER(span, delay + longest), began = 0.0;
+    for (int64_t j = 0; j < s->n; j++) {
+      way += s->bounds[j * s->P + p] * 0.5 * s->stop_v[j] * s->stop_v[j] / s->a_max[j];
+      began += s->bounds[j * s->P + p] * fabs(s->stop_q[j] - s->start[j]);
+    }
+    if (s->start_distances[p] - began - way - passed < s->least[p] + ERROR)
+      most = larger_or_nan(most, LARGER(2.0 * way, passed) / (SPACING * LARGER(s->least[p], ERROR)));
+  }
+  return most < MOST_SAMPLES ? (int)ceil(most) : MOST_SAMPLES;
+}
+
 /* Of the full stop from (q, v):  q_j(t) = q_j + v_j t - 1/2 sign(v_j) a_j t^2  until |v_j| / a_j, after a delay; and,
    where there are movers, of waiting until the span is over. A lag is added to all configurations once more. */
 void stop_violation(Scene *s, double delay, double span, const double *lag) {
   const double *q = s->stop_q, *v = s->stop_v, *a_max = s->a_max;
-  double path[2 * SAMPLES * MOST_COORDINATES], times[2 * SAMPLES], found[4 * SAMPLES], longest = 0.0;
-  int64_t n = s->n, count = SAMPLES;
+  double path[2 * MOST_SAMPLES * MOST_COORDINATES], times[2 * MOST_SAMPLES], found[4 * MOST_SAMPLES], longest = 0.0;
+  int64_t n = s->n;
   int moving = 0;
   for (int64_t p = 0; p < s->P; p++) moving |= s->speed[p] > 0.0;
   for (int64_t j = 0; j < n; j++) longest = larger_or_nan(longest, fabs(v[j]) / a_max[j]);
-  for (int k = 0; k < SAMPLES; k++) {
-    double time = longest * (k + 1) / SAMPLES;
+  int stop = samples(s, delay, longest, span), count = stop;
+  for (int k = 0; k < stop; k++) {
+    double time = longest * (k + 1) / stop;
     times[k] = delay + time;
     for (int64_t j = 0; j < n; j++) {
       double braking = SMALLER(time, fabs(v[j]) / a_max[j]), half = 0.5 * a_max[j] * braking * braking;
       path[k * n + j] = q[j] + v[j] * braking - (v[j] > 0.0 ? half : v[j] < 0.0 ? -half : 0.0);
     }
   }
-  double rest = times[SAMPLES - 1], left = span - rest;
+  double rest = times[stop - 1], left = span - rest;
   if (moving && left > 0.0) {
-    for (int k = 0; k < SAMPLES; k++) {
-      memcpy(path + (SAMPLES + k) * n, path + (SAMPLES - 1) * n, n * sizeof(double));
-      times[SAMPLES + k] = rest + left * (k + 1) / SAMPLES;
+    for (int k = 0; k < stop; k++) {
+      memcpy(path + (stop + k) * n, path + (stop - 1) * n, n * sizeof(double));
+      times[stop + k] = rest + left * (k + 1) / stop;
     }
-    count = 2 * SAMPLES;
+    count = 2 * stop;
   }
   s->violation[0] = s->violation[1] = 0.0;
   for (int lagging = 0; lagging <= (lag ? 1 : 0); lagging++) {

@@ -39,3 +39,24 @@ def test_where_obstacles_move_rest_is_not_safe_for_ever(away, all_):
     violation = violation_of(REST, pillar)
     assert violation.all == pytest.approx(all_, abs=1e-6)
     assert violation.hard == 0.0  # a pillar that comes by itself is nobody's fault
+
+
+def test_nothing_thin_stands_between_the_samples_of_a_stop():
+    """Law: a stop falls as short of safety as its path does at any time, but for half of a least distance."""
+    rng = np.random.default_rng(0)
+    fastest, slowing = MODEL.description.limits.velocity, MODEL.description.limits.acceleration
+    for _ in range(40):
+        v = rng.uniform(-1.0, 1.0, MODEL.size) * fastest
+        time = np.minimum(
+            np.linspace(0.0, 1.0, 400)[:, None] * np.max(np.abs(v) / slowing), np.abs(v) / slowing
+        )
+        path = HOME + v * time - 0.5 * np.sign(v) * slowing * time**2
+        hand = MODEL.pose(path[rng.integers(100, 300)]).position
+        lamp = Obstacle("lamp", Shape("sphere", [0.01]), hand)
+        collision = CollisionModel(MODEL, (lamp,))
+        margins = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
+        now = HOME, collision.values(HOME[None])[0]
+        certificate = StopCertificate(collision, margins, span=1.0)
+        worst = certificate.along(path, np.zeros(len(path)), now).max(axis=0)[1]
+        missed = worst - certificate.violation(HOME, v, now).all
+        assert missed <= 0.5 * margins.max()
