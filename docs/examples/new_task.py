@@ -13,7 +13,6 @@ from handrail.collect.world.scene import Scene, SceneObject
 from handrail.collect.world.task import Start, Task, TaskState, Verdict
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers import Pose, RobotModel, Shape
-from handrail.controllers.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class TouchBall(Task):
         ball = SceneObject("ball", Shape("sphere", np.array([0.03])), place, ghost=True)
         return Start(Scene((ball,)), model.description.home, Pose(place, home.rotation))
 
-    def features(self, state: TaskState) -> FloatArray:
+    def features(self, state: TaskState) -> np.ndarray:
         """Return what is recorded as `observation.environment_state`: where the ball is, (3,) [m]."""
         return state.pose("ball").position
 
