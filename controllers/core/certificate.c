@@ -33,17 +33,18 @@ void path_violations(Scene *s, int64_t count, const double *path, const double *
 }
 
 /* Samples of a full stop and the waiting after it: so many that no pair which may come below its least distance goes
-   farther from one to the next than a share of that; a stop goes twice as fast at first as on average. */
+   farther from one to the next than a share of that, at its speed at first; but for the most that there may be. */
 static int samples(const Scene *s, double delay, double longest, double span, const double *lag) {
   double most = 1.0;
   for (int64_t p = 0; p < s->P; p++) {
-    double way = 0.0, passed = s->speed[p] * LARGER(span, delay + longest), began = 0.0;
+    double way = 0.0, fast = 0.0, passed = s->speed[p] * LARGER(span, delay + longest), began = 0.0;
     for (int64_t j = 0; j < s->n; j++) {
       way += s->bounds[j * s->P + p] * 0.5 * s->stop_v[j] * s->stop_v[j] / s->a_max[j];
+      fast += s->bounds[j * s->P + p] * fabs(s->stop_v[j]);
       began += s->bounds[j * s->P + p] * (fabs(s->stop_q[j] - s->start[j]) + (lag ? fabs(lag[j]) : 0.0));
     }
     if (s->start_distances[p] - began - way - passed < s->least[p] + ERROR)
-      most = larger_or_nan(most, LARGER(2.0 * way, passed) / (SPACING * LARGER(s->least[p], ERROR)));
+      most = larger_or_nan(most, (fast * longest + passed) / (SPACING * LARGER(s->least[p], ERROR)));
   }
   return most < MOST_SAMPLES ? (int)ceil(most) : MOST_SAMPLES;
 }
