@@ -13,7 +13,7 @@ from handrail.datasets.comparison.groups import load_groups
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.summary import summarize
-from handrail.datasets.reading.reader import read_episodes, read_info
+from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.policies.imitation.training.source import read_source
 
@@ -80,13 +80,3 @@ def test_without_any_label_nothing_is_made_up(tmp_path):
         read_source(tiny(root, tmp_path, success_only=True))
     with pytest.raises(HandrailError, match=r"^--mode: expected episodes that say their mode"):
         read_source(tiny(root, tmp_path, mode="ee"))
-
-
-def test_lerobot_s_policies_read_and_write_nothing_of_it(edited):
-    from lerobot.utils.feature_utils import dataset_to_policy_features
-
-    known = read_info(next(iter(edited))).features
-    described = {key: {"dtype": f.dtype, "shape": f.shape, "names": f.names} for key, f in known.items()}
-    assert set(OUTCOME) <= set(known)
-    found = dataset_to_policy_features(described)
-    assert set(found) == {"observation.state", "observation.environment_state", "action"}

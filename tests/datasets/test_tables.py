@@ -5,7 +5,6 @@ import io
 
 import numpy as np
 import pytest
-from places import ROOT
 from rich.console import Console
 
 from handrail.controllers.errors import HandrailError
@@ -36,14 +35,6 @@ def test_every_cell_is_shown_everywhere():
     assert "<c>" not in shown
     assert '<td class="quiet" title="why">' in shown
     assert "a\\|b" in markdown_table(TABLE)
-
-
-def test_there_is_one_page_one_stylesheet_and_one_table():
-    """A report that writes its own would drift away from the others."""
-    floors = ("datasets", "collect", "policies", "scripts")
-    files = [path for floor in floors for path in (ROOT / floor).rglob("*.py")]
-    marks = ("<style", "<table", "<!doctype")
-    assert not [path.name for path in files if any(mark in path.read_text() for mark in marks)]
 
 
 def test_a_part_is_replaced_between_either_kind_of_mark():

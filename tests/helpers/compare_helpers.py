@@ -60,20 +60,6 @@ def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camer
     return _write(root, "so101", names, fps, map(episode, range(EPISODES)), camera)
 
 
-def arm_dataset(root: Path, scale: float, velocities: bool) -> Path:
-    """Record an arm with bare names, steered by positions or by velocities."""
-    rng = np.random.default_rng(1)
-
-    def episode(number: int):
-        state = np.zeros(3, np.float32)
-        for index in range(FRAMES + 2 * number):
-            goal = scale * (np.sin(0.1 * index + np.arange(3)) + 0.05 * rng.normal(size=3))
-            yield state, (30.0 * (goal - state) if velocities else goal), 0
-            state = goal.astype(np.float32)
-
-    return _write(root, "arm", ["pan", "lift", "elbow"], 30, map(episode, range(8)), False)
-
-
 def handrail_dataset(root: Path, fail_every: int, mode: str, episodes: int = 12, slow: int = 0) -> str:
     """Record with Handrail's writer: seeds are the same in every dataset, lengths are not."""
     names = ("tool.x", "tool.y", "tool.z")

@@ -124,10 +124,3 @@ def test_its_handle_is_the_gripper(driven):
     for place, closed in ((55.0, 0.0), (30.0, 1.0), (55.0, 1.0), (70.0, 0.0)):
         driven.main.joints["handle.pos"] = place
         assert driven.act().gripper == closed
-
-
-def test_the_card_says_how_far_the_leader_stands_from_the_arm(driven):
-    stands = np.degrees(driven.q[3:5]) * [1.0, -1.0]
-    driven.main.joints = {"pan.pos": stands[0] + 25.0, "lift.pos": stands[1], "handle.pos": 100.0}
-    driven.act()
-    assert "leader 25° from the arm" in driven.shown()

@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from device_players import recorded
 from driven_person import CHANNELS, FORWARD, MODEL, START, Driven
 
 from handrail.collect.operators.modes import MODES
@@ -81,21 +80,6 @@ def test_a_gamepad_moves_only_while_its_shoulder_is_held():
     assert not driven.act().values.any()
     driven.push()
     assert driven.act().values.any()
-
-
-def test_recorded_events_of_a_gamepad_move_only_where_they_should():
-    """From the file that the real class is tested with: held from 0.2 s to 1.7 s."""
-    driven = Driven("gamepad")
-    driven.person.ask(Ask("start"))
-    moved = []
-    for event in recorded("gamepad.json"):
-        trigger = event["control"].endswith("trigger")
-        driven.main.values[event["control"]] = max(0.0, event["value"]) if trigger else event["value"]
-        if abs(event["value"]) < 0.12:
-            driven.main.values[event["control"]] = 0.0
-        answer = driven.act(0.01)
-        moved += [event["time"]] if isinstance(answer, Intent) and answer.values.any() else []
-    assert moved == [0.4, 0.45, 0.5, 0.8, 1.6]
 
 
 @pytest.mark.parametrize(
@@ -192,17 +176,6 @@ def test_the_age_is_the_readings_own():
     driven.begin()
     driven.main.time = driven.clock.now - 0.01
     assert driven.act(0.05).raw.age == pytest.approx(0.06)
-
-
-def test_the_card_says_how_it_stands_and_what_the_controls_do_now():
-    driven = Driven("gamepad")
-    driven.begin()
-    shown = driven.shown()
-    for words in ("gamepad: driving", "mode ee", "hold left shoulder to move", "hand forward / backward"):
-        assert words in shown
-    driven.main.gone, driven.main.trouble = True, "gamepad: unplugged; plug it in again, then press start"
-    driven.act()
-    assert "unplugged; plug it in again" in driven.shown()
 
 
 def test_the_way_that_the_card_shows_leads_to_the_goal():

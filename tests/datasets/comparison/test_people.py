@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_helpers import command
+from command_helpers import ran, refused
 from datasets_helpers import create
 
 from handrail.controllers.errors import HandrailError
@@ -182,7 +182,7 @@ def test_a_missing_score_is_missing_and_counted(six):
     assert of(six[1].contrasts, FORMS, "sus")["direct"].estimate == pytest.approx(-33.0)
     raw = of(six[1].values, FORMS, "tlx_raw").values()
     assert all(mean.estimate is None and mean.counts == (0,) for mean in raw)
-    assert "missing" in command("--study", six[0], "--output", six[0] / "out", name="compare").stdout
+    assert "missing" in ran("--study", six[0], "--output", six[0] / "out", name="compare")
 
 
 def test_scripted_operators_stand_beside_people_and_are_not_tested(six, tmp_path):
@@ -212,10 +212,9 @@ def test_demo_data_say_so_above_every_table(tmp_path):
         (task, mode): people(1, lambda place: 40) for task in ("reach", "tray") for mode in ("direct", "ee")
     }
     root = study(tmp_path / "demo", data, ["P1,ee,sus,80"], demo=True)
-    done = command("--study", root, "--output", tmp_path / "out", name="compare")
-    assert done.returncode == 0, done.stderr
+    said = ran("--study", root, "--output", tmp_path / "out", name="compare")
     tables = 6  # means and differences of two tasks and the forms
-    assert done.stdout.count(DEMO) == tables
+    assert said.count(DEMO) == tables
     assert (tmp_path / "out" / "report.html").read_text().count(f"<h3>{DEMO}") == tables
     told = json.loads((tmp_path / "out" / "report.json").read_text())
     assert told["source"] == DEMO
@@ -234,33 +233,21 @@ def test_scores_that_say_so_make_it_demo_data(tmp_path):
     assert of(comparison.values, FORMS, "tlx_raw")["ee"].counts == (0,)
 
 
-WRONG = {
-    "another column": (
-        ["participant,condition,score,value,mood", "P1,ee,sus,80,good"],
-        "expected the columns",
-    ),
-    "nan": (
-        ["participant,condition,score,value", "P1,ee,sus,nan"],
-        "line 2: value: expected a number >= 0.*, got nan",
-    ),
-    "words": (["participant,condition,score,value", "P1,ee,sus,good"], "value: expected a number"),
-    "twice": (["participant,condition,score,value", "P1,ee,sus,80", "P1,ee,sus,80"], "P1 ee sus twice"),
-    "score": (
-        ["participant,condition,score,value", "P1,ee,mood,80"],
-        "score: expected one of tlx_raw, tlx_weighted, sus, got 'mood'",
-    ),
-    "nobody": (["participant,condition,score,value", ",ee,sus,80"], "line 2: expected 4 values"),
-    "source": (
-        ["participant,condition,score,value,source", "P1,ee,sus,80,me"],
-        "source: expected one of people, .*, got 'me'",
-    ),
-    "empty": ([""], "expected the columns"),
-}
+HEAD = "participant,condition,score,value"
+WRONG = [
+    ((f"{HEAD},mood", "P1,ee,sus,80,good"), "expected the columns"),
+    ((HEAD, "P1,ee,sus,nan"), "line 2: value: expected a number >= 0.*, got nan"),
+    ((HEAD, "P1,ee,sus,good"), "value: expected a number"),
+    ((HEAD, "P1,ee,sus,80", "P1,ee,sus,80"), "P1 ee sus twice"),
+    ((HEAD, "P1,ee,mood,80"), "score: expected one of tlx_raw, tlx_weighted, sus, got 'mood'"),
+    ((HEAD, ",ee,sus,80"), "line 2: expected 4 values"),
+    ((f"{HEAD},source", "P1,ee,sus,80,me"), "source: expected one of people, .*, got 'me'"),
+    (("",), "expected the columns"),
+]
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_score_is_refused(case, tmp_path):
-    lines, words = WRONG[case]
+@pytest.mark.parametrize(("lines", "words"), WRONG)
+def test_a_wrong_score_is_refused(lines, words, tmp_path):
     write_scores(tmp_path, lines)
     with pytest.raises(HandrailError, match=words):
         read_scores(tmp_path / "exports" / "scores.csv")
@@ -274,24 +261,18 @@ def test_no_bytes_make_a_traceback(tmp_path):
             read_scores(path)
 
 
-def refused(*arguments):
-    done = command(*arguments, name="compare")
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.count("\n") == 1
-    return done.stderr
-
-
 def test_a_wrong_study_is_one_clear_line(tmp_path, six):
-    assert "expected the study.json" in refused("--study", tmp_path)
-    (tmp_path / "study.json").write_text('{"demo": "yes"}')
-    assert "expected demo to be true or false, got 'yes'" in refused("--study", tmp_path)
-    (tmp_path / "study.json").write_text("[]")
-    assert "expected demo to be true or false" in refused("--study", tmp_path)
-    (tmp_path / "study.json").write_text("{}")
-    assert "expected datasets in data/TASK/MODE" in refused("--study", tmp_path)
-    assert "unknown baseline 'joints': expected one of direct, ee" in refused(
-        "--study", six[0], "--baseline", "joints"
-    )
-    assert "--by: expected it without --study" in refused("--study", six[0], "--by", "mode")
+    for content, said in (
+        (None, "expected the study.json"),
+        ('{"demo": "yes"}', "expected demo to be true or false, got 'yes'"),
+        ("[]", "expected demo to be true or false"),
+        ("{}", "expected datasets in data/TASK/MODE"),
+    ):
+        if content is not None:
+            (tmp_path / "study.json").write_text(content)
+        refused("--study", tmp_path, name="compare", told=said)
+    unknown = "unknown baseline 'joints': expected one of direct, ee"
+    refused("--study", six[0], "--baseline", "joints", name="compare", told=unknown)
+    refused("--study", six[0], "--by", "mode", name="compare", told="--by: expected it without --study")
     root = study(tmp_path / "study", {("reach", "ee"): people(1, lambda place: 40)}, ["P1,joints,sus,80"])
-    assert "unknown condition 'joints': expected one of ee" in refused("--study", root)
+    refused("--study", root, name="compare", told="unknown condition 'joints': expected one of ee")

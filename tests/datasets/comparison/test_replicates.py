@@ -93,13 +93,6 @@ def test_mcnemar_by_scene_is_mcnemar_where_no_scene_repeats():
     assert mcnemar_by_scene(np.zeros(5, int), range(5)) == 1.0
 
 
-def test_mcnemar_counts_a_scene_once():
-    """Golden: six scenes, three policies each that succeed under one condition only: 2 / 2⁶, not 2 / 2¹⁸."""
-    found = paired_shares([True] * 18, [False] * 18, [*range(6)] * 3)
-    assert found.p == pytest.approx(2 / 2**6)
-    assert paired_shares([True] * 18, [False] * 18).p == pytest.approx(2 / 2**18)
-
-
 def test_scenes_that_repeat_do_not_make_chance_a_difference():
     """Conditions that are the same, three policies in 30 scenes of which each condition likes half."""
     generator, seen, naive = rng(4), 0, 0

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from compare_helpers import check_texts, evaluations, handrail_dataset
+from compare_helpers import check_texts, evaluations
 from figure_helpers import drawn_numbers, shows
 
 from handrail.datasets.comparison.compare import compare
@@ -183,19 +183,6 @@ def test_policies_come_first_and_the_page_names_their_family(ours, tmp_path):
     assert page.index(said) < page.index("1 like-for-like")
 
 
-@pytest.mark.parametrize(("base", "label"), [("quick", "quick__intent"), ("slow", "quick")])
-def test_policies_come_first_also_with_one_condition(ours, tmp_path, base, label):
-    given = evaluations(tmp_path / "e.json", 4, **{label: 0.9})
-    comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
-    said, name = headline(comparison), label.replace("__", " ")
-    assert re.fullmatch(rf"Success of policies: {name} \d+ % \(95 % .*\), compared with no other\.", said)
-    page = dataset_report(comparison).html
-    cards = re.findall(r'<h3>(\w+)</h3><div class="big">(.*?)</div><small>(.*?)</small>', page)
-    assert cards[0][1].endswith("%")
-    assert cards[0][2].startswith("policy success")
-    assert cards[1][1:] == ("–", "no policy was evaluated")
-
-
 def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unlike, page):
     first = headline(unlike)
     assert first.startswith("The tasks and the robots differ: ")
@@ -212,8 +199,3 @@ def test_policies_of_unlike_tasks_do_not_come_before_that(ours, unlike, tmp_path
     given = evaluations(tmp_path / "e.json", 4, quick=0.95, slow=0.3)
     outcomes = compare(CompareConfig(tuple(ours), evaluations=(given,))).outcomes
     assert headline(replace(unlike, outcomes=outcomes)) == headline(unlike)
-
-
-def test_the_same_tasks_in_another_order_are_the_same(tmp_path):
-    roots = [handrail_dataset(tmp_path / name, 100, name, 5) for name in ("a", "b")]
-    assert compare(CompareConfig(tuple(roots))).unlike == ()

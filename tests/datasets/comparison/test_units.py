@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import JOINTS, arm_dataset, handrail_dataset, lerobot_dataset
+from compare_helpers import JOINTS, handrail_dataset, lerobot_dataset
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
@@ -127,32 +127,6 @@ def test_only_what_is_on_one_scale_is_pooled():
     found = measure(groups, np.random.default_rng(0))
     one, other, degrees = (each.scale for each in found.groups.values())
     assert one is other is not degrees
-
-
-@pytest.fixture(scope="module")
-def scaled(tmp_path_factory):
-    """Positions of an arm at scale 20, and velocities of the same arm under the same names."""
-    folder = tmp_path_factory.mktemp("arms")
-    positions = arm_dataset(folder / "positions", 20.0, velocities=False)
-    return compare(
-        CompareConfig((str(positions), str(arm_dataset(folder / "velocities", 1.0, velocities=True))))
-    )
-
-
-def test_positions_at_scale_20_are_not_tested_against_velocities(scaled):
-    found = {each.measure.name: each for view in scaled.views for each in view.differences}
-    for name in (
-        "tracking_error",
-        "variation_ratio",
-        "saturation",
-        "action_variance",
-        "information",
-        "sparc",
-    ):
-        assert "do not say whether it is positions or velocities" in found[name].incomparable
-        assert found[name].p is None
-        assert not found[name].detected
-    assert not found["length"].reason
 
 
 def test_a_foreign_arm_beside_ours(tmp_path):

@@ -33,11 +33,6 @@ def streamed(root, monkeypatch) -> list[tuple[int, int, list[float]]]:
         )
 
 
-def _shades(item) -> tuple[int, int, list[float]]:
-    shades = [float(item[key].mean()) for key in CAMERAS]
-    return int(item["episode_index"]), int(item["frame_index"]), shades
-
-
 def test_a_recording_says_to_pack_before_streaming_and_packed_it_streams_right(tmp_path, monkeypatch):
     root = record(tmp_path / "set", EPISODES, cameras=True)
     assert f"handrail-edit pack {root} before streaming" in packing_advice(root)

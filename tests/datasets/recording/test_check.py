@@ -85,14 +85,6 @@ def test_training_and_comparison_notice(tmp_path):
         read_source(config)
 
 
-@pytest.mark.parametrize("command_line", ["compare --verify", "train --verify", "record --resume --verify"])
-def test_verify_is_a_flag(command_line):
-    name, *words = command_line.split()
-    extra = ["folder"] if name == "compare" else []
-    done = command(*extra, *words, "--output" if name != "record" else "--task", "x", name=name)
-    assert "nrecognized" not in done.stderr
-
-
 def test_a_dataset_of_lerobot_copied_in_part_is_named_as_such(tmp_path):
     root = lerobot_dataset(tmp_path / "set", JOINTS, 30, 0.0, camera=True)
     check_whole(root)

@@ -31,11 +31,6 @@ from handrail.datasets.reading.reader import read_episodes, read_frames, read_in
 from handrail.datasets.recording.writer import EpisodeWriter
 
 
-def test_an_empty_folder_is_fine(tmp_path):
-    (tmp_path / "set").mkdir()
-    assert len(read_episodes(record(tmp_path / "set", 1))) == 1
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [

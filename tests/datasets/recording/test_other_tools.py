@@ -1,12 +1,11 @@
 """What other tools do to a dataset is no damage; what repair and `--resume` do is said in one line."""
 
 import json
-import os
 import warnings
 
 import numpy as np
 import pytest
-from command_helpers import command, ran, refused
+from command_helpers import command, ran
 from datasets_helpers import (
     CAMERAS,
     check_pictures,
@@ -22,7 +21,6 @@ from datasets_helpers import (
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.repair import repair
 
 
@@ -87,15 +85,3 @@ def test_episodes_of_another_tool_are_not_touched(tmp_path):
         with pytest.raises(HandrailError, match="written by another tool"):
             attempt()
         assert tree(root) == before
-
-
-def test_resume_says_what_it_put_in_order(tmp_path):
-    base = ["--task", "reach", "--dataset.root", tmp_path / "set", "--dataset.num_episodes", 1]
-    base += ["--time_limit", 1]
-    ran(*base)
-    assert "written anew" not in command(*base, "--resume").stderr
-    Layout(tmp_path / "set").stats.write_text('{"action": {"mean": [NaN]}}')
-    assert "written anew: meta/stats.json" in command(*base, "--resume").stderr
-    os.truncate(Layout(tmp_path / "set").data(1), 10)
-    refused(*base, "--resume", told="episode 1")
-    assert len(read_episodes(tmp_path / "set")) == 3

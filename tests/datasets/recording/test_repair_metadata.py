@@ -43,12 +43,3 @@ def test_the_last_line_and_the_count_gone_cost_no_data(tmp_path, episodes, info)
         resume(root)
     assert not repair(root).done[REMOVED]
     assert layout.data(episodes - 1).read_bytes() == rows
-
-
-def test_the_last_line_gone_is_noticed_by_the_count(root):
-    Layout(root).row(3).unlink()
-    report = repair(root)
-    assert report.damage == ("episode 3: meta/episodes/chunk-000/file-003.parquet is missing",)
-    assert not report.done[REMOVED]
-    assert len(repair(root, set_aside_damaged=True).lost) == 1
-    assert len(tree(root / ".damaged")) == 3
