@@ -1,84 +1,149 @@
 /* How far a motion falls short of safety: below its least distance, beyond a joint's range, or, where one is beyond
-   already, farther than now. Written as (of the hard limits alone, of all), [m, rad]; 0 where it is safe. */
+   already, farther than now. Written as (of the hard limits alone, of all), [m, rad]; 0 where it is safe.
+
+   A pair p comes nearer by at most r_p = |v_p| + sum_j L_jp |v_j| a second. Where it was d_p, it is measured again
+   before it can have come below its least distance by more than a share of that. */
 #include "core.h"
 #include "vector.h"
 
-#define ERROR 1e-3      /* of signed distances, that is no loss [m] */
-#define HARD_ERROR 1e-4 /* the same where a thing that stands is nearer than its hard limit [m] */
-#define HARD 0.5        /* hard limit of the robot with itself and with what stands, as a share of the least */
-#define BEYOND 0.01     /* of its range that a joint may come to rest [m, rad] */
-#define MOST_SAMPLES 128 /* of a stop, and of the waiting after it */
-#define SPACING 0.5     /* of samples, as a share of the least distance, on the way of a pair */
+#define ERROR 1e-3       /* of signed distances, that is no loss [m] */
+#define HARD_ERROR 1e-4  /* the same where a thing that stands is nearer than its hard limit [m] */
+#define HARD 0.5         /* hard limit of the robot with itself and with what stands, as a share of the least */
+#define BEYOND 0.01      /* of its range that a joint may come to rest [m, rad] */
+#define MOST_SAMPLES 128 /* of a stretch */
+#define SPACING 0.5      /* way of a pair between two samples, as a share of its least distance */
 
-/* Along a path, (count, 2): distances are measured where they can come below the least. */
-void path_violations(Scene *s, int64_t count, const double *path, const double *times, double *violations) {
-  const double *least = s->least, *start = s->start, *now = s->start_distances, *lower = s->lower, *upper = s->upper;
-  for (int64_t k = 0; k < count; k++) {
-    const double *q = path + k * s->n;
-    double hard = 0.0, all = 0.0;
-    scene_values(s, 1, q, times + k, start, now, least, s->here);
-    for (int64_t p = 0; p < s->P; p++) {
-      all = larger_or_nan(all, SMALLER(least[p], now[p] - ERROR) - s->here[p]);
-      if (s->slack[p] != MOVING)
-        hard = larger_or_nan(hard, SMALLER(HARD * least[p], now[p] - HARD_ERROR) - s->here[p]);
-    }
-    for (int64_t j = 0; j < s->n; j++) {
-      double room = SMALLER(q[j] - lower[j], upper[j] - q[j]) + BEYOND;
-      double before = SMALLER(0.0, SMALLER(start[j] - lower[j], upper[j] - start[j]));
-      if (!(room >= 0.0)) hard = larger_or_nan(hard, before - room);
-    }
-    violations[2 * k] = hard;
-    violations[2 * k + 1] = larger_or_nan(all, hard);
+/* A part of a motion, in which velocities are linear in time. */
+typedef struct {
+  double q[MOST_COORDINATES];      /* where it begins */
+  double before[MOST_COORDINATES]; /* velocities at both ends */
+  double after[MOST_COORDINATES];
+  double time;                     /* when it begins, from now [s] */
+  double length;                   /* [s] */
+} Stretch;
+
+static void find(Scene *s, double time, double hard, double all) {
+  if (!(hard <= 0.0 && all <= 0.0)) s->violation[2] = SMALLER(s->violation[2], time);
+  s->violation[0] = larger_or_nan(s->violation[0], hard);
+  s->violation[1] = larger_or_nan(s->violation[1], larger_or_nan(all, hard));
+}
+
+static void check_pair(Scene *s, int64_t pair, double time) {
+  double least = s->least[pair], now = s->start_distances[pair], distance = s->here[pair];
+  double hard = SMALLER(HARD * least, now - HARD_ERROR) - distance;
+  find(s, time, s->slack[pair] == MOVING ? 0.0 : hard, SMALLER(least, now - ERROR) - distance);
+}
+
+static void check_joints(Scene *s, const double *q, double time) {
+  for (int64_t j = 0; j < s->n; j++) {
+    double room = SMALLER(q[j] - s->lower[j], s->upper[j] - q[j]) + BEYOND;
+    double before = SMALLER(0.0, SMALLER(s->start[j] - s->lower[j], s->upper[j] - s->start[j]));
+    if (!(room >= 0.0)) find(s, time, before - room, 0.0);
   }
 }
 
-/* Samples of a full stop and the waiting after it: so many that no pair which may come below its least distance goes
-   farther from one to the next than a share of that, at its speed at first; but for the most that there may be. */
-static int samples(const Scene *s, double delay, double longest, double span, const double *lag) {
-  double most = 1.0;
-  for (int64_t p = 0; p < s->P; p++) {
-    double way = 0.0, fast = 0.0, passed = s->speed[p] * LARGER(span, delay + longest), began = 0.0;
-    for (int64_t j = 0; j < s->n; j++) {
-      way += s->bounds[j * s->P + p] * 0.5 * s->stop_v[j] * s->stop_v[j] / s->a_max[j];
-      fast += s->bounds[j * s->P + p] * fabs(s->stop_v[j]);
-      began += s->bounds[j * s->P + p] * (fabs(s->stop_q[j] - s->start[j]) + (lag ? fabs(lag[j]) : 0.0));
-    }
-    if (s->start_distances[p] - began - way - passed < s->least[p] + ERROR)
-      most = larger_or_nan(most, (fast * longest + passed) / (SPACING * LARGER(s->least[p], ERROR)));
-  }
-  return most < MOST_SAMPLES ? (int)ceil(most) : MOST_SAMPLES;
+/* q_j(t) = q_j + v_j t + 1/2 (v'_j - v_j) t^2 / length. */
+static void position(const Scene *s, const Stretch *part, double time, double *q) {
+  double share = part->length > 0.0 ? time / part->length : 0.0;
+  for (int64_t j = 0; j < s->n; j++)
+    q[j] = part->q[j] + time * (part->before[j] + 0.5 * share * (part->after[j] - part->before[j]));
 }
 
-/* Of the full stop from (q, v):  q_j(t) = q_j + v_j t - 1/2 sign(v_j) a_j t^2  until |v_j| / a_j, after a delay; and,
-   where there are movers, of waiting until the span is over. A lag is added to all configurations once more. */
-void stop_violation(Scene *s, double delay, double span, const double *lag) {
-  const double *q = s->stop_q, *v = s->stop_v, *a_max = s->a_max;
-  double path[2 * MOST_SAMPLES * MOST_COORDINATES], times[2 * MOST_SAMPLES], found[4 * MOST_SAMPLES], longest = 0.0;
+/* Find the pairs that can come below their least distance on a way, (n), in a time. */
+static int64_t close_pairs(Scene *s, const double *way, double time) {
+  int64_t count = 0;
+  for (int64_t p = 0; p < s->P; p++) s->bound[p] = s->here[p] - s->speed[p] * time;
+  for (int64_t j = 0; j < s->n; j++) add(s->bound, -way[j], s->bounds + j * s->P, s->P);
+  for (int64_t p = 0; p < s->P; p++)
+    if (!(s->bound[p] >= s->least[p])) s->close[count++] = p;
+  return count;
+}
+
+/* Go through a stretch; distances of close pairs, or lower bounds of them, stand in here. */
+static void pass(Scene *s, int64_t count, const Stretch *part) {
+  double *rate = s->bound, q[MOST_COORDINATES], witness[9], passed = 0.0;
+  for (int64_t i = 0; i < count; i++) {
+    int64_t p = s->close[i];
+    rate[p] = s->speed[p];
+    for (int64_t j = 0; j < s->n; j++)
+      rate[p] += s->bounds[j * s->P + p] * LARGER(fabs(part->before[j]), fabs(part->after[j]));
+  }
+  while (count && passed < part->length) {
+    double left = part->length - passed, step = left;
+    int is_placed = 0;
+    for (int64_t i = 0; i < count; i++) {
+      int64_t p = s->close[i];
+      double room = LARGER(s->here[p] - s->least[p], 0.0) + SPACING * LARGER(s->least[p], ERROR);
+      if (rate[p] * step > room) step = room / rate[p];
+    }
+    step = LARGER(step, part->length / MOST_SAMPLES);
+    passed = step < left ? passed + step : part->length;
+    for (int64_t i = 0; i < count; i++) {
+      int64_t p = s->close[i];
+      s->here[p] -= rate[p] * step;
+      if (s->here[p] >= s->least[p]) continue;
+      if (!is_placed) {
+        position(s, part, passed, q);
+        place_joints(s, q);
+        is_placed = 1;
+      }
+      s->here[p] = measured(s, p, part->time + passed, witness);
+      check_pair(s, p, part->time + passed);
+    }
+  }
+  position(s, part, part->length, q);
+  check_joints(s, q, part->time + part->length);
+}
+
+/* Begin the stretch from a knot to the next; the first begins where the robot is now. */
+static void begin_stretch(const Scene *s, const double *velocities, double dt, double elapsed, int first,
+                          Stretch *part) {
+  double share = first ? SMALLER(elapsed / dt, 1.0) : 0.0;
+  part->length = dt * (1.0 - share);
+  for (int64_t j = 0; j < s->n; j++) {
+    part->after[j] = velocities[s->n + j];
+    part->before[j] = (1.0 - share) * velocities[j] + share * part->after[j];
+  }
+}
+
+static void end_stretch(const Scene *s, Stretch *part) {
+  position(s, part, part->length, part->q);
+  part->time += part->length;
+}
+
+/* Of a motion from the start to rest, whose velocities are linear between knots, (count, n), dt apart, of which a
+   time less than dt has passed; and, where things move, of waiting until the span is over. With a lag, (n,), of the
+   same motion from start + lag, too. */
+void motion_violation(Scene *s, int64_t count, const double *velocities, double dt, double elapsed, double span,
+                      const double *lag) {
+  double way[MOST_COORDINATES] = {0}, time = 0.0;
   int64_t n = s->n;
   int moving = 0;
+  Stretch part;
+  for (int64_t k = 0; k + 1 < count; k++) {
+    begin_stretch(s, velocities + k * n, dt, elapsed, k == 0, &part);
+    time += part.length;
+    for (int64_t j = 0; j < n; j++) way[j] += 0.5 * part.length * (fabs(part.before[j]) + fabs(part.after[j]));
+  }
   for (int64_t p = 0; p < s->P; p++) moving |= s->speed[p] > 0.0;
-  for (int64_t j = 0; j < n; j++) longest = larger_or_nan(longest, fabs(v[j]) / a_max[j]);
-  int stop = samples(s, delay, longest, span, lag), count = stop;
-  for (int k = 0; k < stop; k++) {
-    double time = longest * (k + 1) / stop;
-    times[k] = delay + time;
-    for (int64_t j = 0; j < n; j++) {
-      double braking = SMALLER(time, fabs(v[j]) / a_max[j]), half = 0.5 * a_max[j] * braking * braking;
-      path[k * n + j] = q[j] + v[j] * braking - (v[j] > 0.0 ? half : v[j] < 0.0 ? -half : 0.0);
-    }
-  }
-  double rest = times[stop - 1], left = span - rest;
-  if (moving && left > 0.0) {
-    for (int k = 0; k < stop; k++) {
-      memcpy(path + (stop + k) * n, path + (stop - 1) * n, n * sizeof(double));
-      times[stop + k] = rest + left * (k + 1) / stop;
-    }
-    count = 2 * stop;
-  }
-  s->violation[0] = s->violation[1] = 0.0;
+  double wait = moving ? LARGER(span - time, 0.0) : 0.0;
+  s->violation[0] = s->violation[1] = 0.0, s->violation[2] = INFINITY;
   for (int lagging = 0; lagging <= (lag ? 1 : 0); lagging++) {
-    for (int64_t i = 0; lagging && i < count * n; i++) path[i] += lag[i % n];
-    path_violations(s, count, path, times, found);
-    for (int64_t i = 0; i < 2 * count; i++) s->violation[i % 2] = larger_or_nan(s->violation[i % 2], found[i]);
+    memcpy(s->here, s->start_distances, s->P * sizeof(double));
+    memcpy(part.q, s->start, n * sizeof(double));
+    for (int64_t j = 0; lagging && j < n; j++) {
+      part.q[j] += lag[j];
+      add(s->here, -fabs(lag[j]), s->bounds + j * s->P, s->P);
+    }
+    part.time = 0.0;
+    int64_t close = close_pairs(s, way, time + wait);
+    for (int64_t k = 0; k + 1 < count; k++) {
+      begin_stretch(s, velocities + k * n, dt, elapsed, k == 0, &part);
+      pass(s, close, &part);
+      end_stretch(s, &part);
+    }
+    memset(part.before, 0, sizeof part.before), memset(part.after, 0, sizeof part.after);
+    part.length = wait;
+    if (wait > 0.0) pass(s, close, &part);
   }
 }

@@ -53,9 +53,8 @@ typedef struct {
   double *least;             /* (P,) distances that a motion has to keep, */
   double *start;             /* (n,) from here, */
   double *start_distances;   /* (P,) where they are these */
-  double *stop_q;            /* (n,) where a full stop begins, */
-  double *stop_v;            /* (n,) how fast */
-  double *violation;         /* (2,) how far that falls short of safety */
+  int64_t *close;            /* (P,) pairs that may come too near on the way */
+  double *violation;         /* (3,) how far a motion falls short of safety, and from when on [s] */
   int (*measure)(int64_t pair, const double *placements, double *witness); /* of cores that meet; 0: measured */
 } Scene;
 
@@ -150,6 +149,8 @@ typedef struct {
 } Core;
 
 /* scene.c */
+void place_joints(Scene *scene, const double *q);
+double measured(Scene *scene, int64_t pair, double time, double *witness);
 int64_t scene_distances(Scene *scene, int64_t count, const double *q, const double *times, const double *within,
                         const double *known_q, const double *known, int64_t first, double *values, int64_t *near,
                         double *gradients);
@@ -157,8 +158,8 @@ void scene_values(Scene *scene, int64_t count, const double *q, const double *ti
                   const double *now, const double *within, double *values);
 
 /* certificate.c */
-void path_violations(Scene *scene, int64_t count, const double *path, const double *times, double *violations);
-void stop_violation(Scene *scene, double delay, double span, const double *lag);
+void motion_violation(Scene *scene, int64_t count, const double *velocities, double dt, double elapsed, double span,
+                      const double *lag);
 
 /* trajectory.c */
 void interpolate(const double *velocities, int64_t count, int64_t n, const double *knots, int64_t number, double *out);

@@ -6,7 +6,7 @@
 #include "core.h"
 #include "shapes.h"
 
-static void place_joints(Scene *s, const double *q) {
+void place_joints(Scene *s, const double *q) {
   static const double IDENTITY[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   memcpy(s->world_rotation, IDENTITY, sizeof IDENTITY);
   memset(s->world_position, 0, 3 * sizeof(double));
@@ -48,7 +48,7 @@ static Shape placed(Scene *s, int64_t index, double time) {
 }
 
 /* Return the signed distance of a pair, NaN where it cannot be measured; write its witness. */
-static double measured(Scene *s, int64_t pair, double time, double *witness) {
+double measured(Scene *s, int64_t pair, double time, double *witness) {
   Shape first = placed(s, s->first[pair], time), second = placed(s, s->second[pair], time);
   if (nearest(&first, &second, witness)) {
     double placements[24];

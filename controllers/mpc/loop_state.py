@@ -17,6 +17,8 @@ from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
 
+_ROUNDING = 1e-5  # of a time, relative
+
 
 class LoopState(NamedTuple):
     """The memory of a control loop. The velocity that was sent last is not in it: the robot knows that."""
@@ -29,7 +31,7 @@ class LoopState(NamedTuple):
     time: float = 0.0  # when that was sent [s]
     period: float = 0.0  # time from the command before it [s]
     plan: Plan | None = None  # of the last update; None where the robot follows something else
-    stored: Trajectory | None = None  # the motion that `Backup` goes on with; None before the first
+    planned: float = 0.0  # how long the command follows its plan [s]
     active: IntArray = NOTHING_ACTIVE
     """Names of the rows that were active in the last problem among these pairs."""
 
@@ -56,7 +58,7 @@ class LoopState(NamedTuple):
         return time - self.time if math.isfinite(time) and time > self.time else self.period
 
     def following(
-        self, command: Command, time: float, period: float, plan: Plan | None, stored: Trajectory
+        self, command: Command, time: float, period: float, plan: Plan | None, planned: float
     ) -> "LoopState":
         """Return the state after a command is sent.
 
@@ -65,14 +67,14 @@ class LoopState(NamedTuple):
             time: now, which may be no number [s].
             period: from one command to the next, if it is not known yet [s].
             plan: that it begins, if it does.
-            stored: the motion that `Backup` may go on with.
+            planned: how long it follows that [s].
         """
         elapsed = self.elapsed(time)
         if not math.isfinite(time):
             time = self.time + elapsed
         if self.command is not None:
             period = self.period if self.command.is_over(elapsed) else elapsed
-        return self._replace(command=command, time=time, period=period, plan=plan, stored=stored)
+        return self._replace(command=command, time=time, period=period, plan=plan, planned=planned)
 
     def guess(self, time: float, horizon: int, size: int) -> FloatArray:
         """Return the accelerations that the robot follows from a time on, (N, n): the warm start."""
@@ -80,6 +82,6 @@ class LoopState(NamedTuple):
             return np.zeros((horizon, size))
         elapsed = self.elapsed(time)
         followed: Trajectory = self.command
-        if self.command.plan is not None and self.stored is not None and not self.stored.is_over(elapsed):
+        if self.command.plan is not None and elapsed <= self.planned * (1.0 + _ROUNDING):
             followed = self.command.plan
         return followed.accelerations(horizon, elapsed)

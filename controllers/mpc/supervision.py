@@ -14,8 +14,8 @@ from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.safety.backup import Backup, Situation, full_stop
-from handrail.controllers.safety.certificate import StopCertificate
+from handrail.controllers.safety.backup import Backup, Candidate, Situation, full_stop
+from handrail.controllers.safety.certificate import Certificate, Violation
 from handrail.controllers.safety.limiter import Limiter
 
 _UNHEARD = (Status.INVALID_STATE, Status.INVALID_SCENE, Status.INVALID_INTENT, Status.STALE_INTENT)
@@ -44,7 +44,8 @@ class Supervisor:
         distances = self._distances(loop, state, plan)
         if distances is not None and len(loop.surroundings.collision.held):
             loop = loop._replace(surroundings=loop.surroundings.seen(distances))
-        motion, stored, planned = self._motion(loop, state, plan, distances, halt=status in _UNHEARD)
+        way = self._way(loop, state, plan, distances, halt=status in _UNHEARD)
+        motion, planned = way.motion, way.planned > 0.0
         if plan is not None and not planned:
             status = Status.BACKUP
         diagnostics = _diagnostics(plan, status, start, distances, loop.surroundings)
@@ -52,28 +53,24 @@ class Supervisor:
         planned_path = Trajectory(plan.v, self.settings.dt) if plan is not None and planned else None
         command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics, planned_path)
         return command, loop.following(
-            command, state.time, self.settings.dt, plan if planned else None, stored
+            command, state.time, self.settings.dt, plan if planned else None, way.planned
         )
 
-    def _motion(
+    def _way(
         self, loop: LoopState, state: State, plan: Plan | None, distances: FloatArray | None, halt: bool
-    ) -> tuple[Trajectory, Trajectory, bool]:
-        """Return how the robot moves, to rest at last; what is stored; whether it begins with the plan.
+    ) -> Candidate:
+        """Return how the robot moves, to rest at last.
 
-        Of a plan only what was certified is sent, and then the stop that was certified with it: if the next
-        update is late, nothing moves the robot that nobody has checked.
+        Only what was certified is sent, whole: if the next update is late, nothing moves the robot that
+        nobody has checked.
         """
-        dt = self.settings.dt
         if distances is None:
-            stop = full_stop(self.limiter, self._sent_unseen(loop, state), dt)
-            return stop, stop, False
+            stop = full_stop(self.limiter, self._sent_unseen(loop, state), self.settings.dt)
+            return Candidate(stop, Violation(np.inf, np.inf, 0.0))
         sent, elapsed = state.sent(self.limiter.limits), loop.elapsed(state.time)
-        situation = Situation(state.expected, sent, distances, loop.stored, elapsed)
+        situation = Situation(state.expected, sent, distances, loop.command, elapsed)
         lag = None if state.expected is state.q else state.q - state.expected
-        way = self._backup(loop, lag).choose(situation, plan, halt)
-        if plan is not None and way.planned:
-            return Trajectory(self.limiter.to_rest(way.motion.velocities, dt), dt), way.motion, True
-        return way.motion, way.motion, False
+        return self._backup(loop, lag).choose(situation, plan, halt)
 
     def _sent_unseen(self, loop: LoopState, state: State) -> FloatArray:
         """Return what a robot is being sent whose state is nonsense, (n,): what it follows, if anything."""
@@ -85,7 +82,7 @@ class Supervisor:
     def _backup(self, loop: LoopState, lag: FloatArray | None) -> Backup:
         settings = self.settings
         least, span = settings.margin_share * loop.surroundings.margins, settings.horizon * settings.dt
-        certificate = StopCertificate(loop.surroundings.collision, least, span, lag)
+        certificate = Certificate(loop.surroundings.collision, least, span, lag)
         return Backup(certificate, self.limiter, settings.dt)
 
     def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:

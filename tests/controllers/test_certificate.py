@@ -1,4 +1,4 @@
-"""The stop certificate measures how much too near a stop comes."""
+"""The certificate measures how much too near a motion comes."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,11 @@ from ideal_robot import HOME, MODEL, REST
 
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
+from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.controllers.safety.certificate import StopCertificate
+from handrail.controllers.safety.backup import full_stop
+from handrail.controllers.safety.certificate import Certificate
+from handrail.controllers.safety.limiter import Limiter
 
 FRONT = HOME[0] + 0.48  # of the chassis [m]
 FORWARD = np.eye(MODEL.size)[0]
@@ -17,8 +20,9 @@ def violation_of(v, obstacle):
     """Return what a full stop from home violates."""
     collision = CollisionModel(MODEL, (obstacle,))
     least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
-    certificate = StopCertificate(collision, least, span=1.0)
-    return certificate.violation(HOME, v, (HOME, collision.values(HOME[None])[0]))
+    certificate = Certificate(collision, least, span=1.0)
+    stop = full_stop(Limiter(MODEL.description), v, 0.1)
+    return certificate.violation(stop, HOME, collision.values(HOME[None])[0])
 
 
 @pytest.mark.parametrize(("gap", "all_", "hard"), [(0.2, 0.15, 0.135), (0.5, 0.0, 0.0)])
@@ -41,22 +45,25 @@ def test_where_obstacles_move_rest_is_not_safe_for_ever(away, all_):
     assert violation.hard == 0.0  # a pillar that comes by itself is nobody's fault
 
 
-def test_nothing_thin_stands_between_the_samples_of_a_stop():
-    """Law: a stop falls as short of safety as its path does at any time, but for half of a least distance."""
-    rng = np.random.default_rng(0)
-    fastest, slowing = MODEL.description.limits.velocity, MODEL.description.limits.acceleration
+@pytest.mark.parametrize("dt", [0.1, 0.5])
+@pytest.mark.parametrize("stages", [0, 1, 3])
+def test_nothing_thin_stands_between_the_samples_of_a_motion(stages, dt):
+    """Law: a motion falls as short of safety as its path at any time, but for half of a least distance."""
+    rng, limits, found = np.random.default_rng(0), MODEL.description.limits, 0
     for _ in range(40):
-        v = rng.uniform(-1.0, 1.0, MODEL.size) * fastest
-        time = np.minimum(
-            np.linspace(0.0, 1.0, 400)[:, None] * np.max(np.abs(v) / slowing), np.abs(v) / slowing
-        )
-        path = HOME + v * time - 0.5 * np.sign(v) * slowing * time**2
-        hand = MODEL.pose(path[rng.integers(100, 300)]).position
-        lamp = Obstacle("lamp", Shape("sphere", [0.01]), hand)
+        v = rng.uniform(-1.0, 1.0, (stages + 1, MODEL.size)) * limits.velocity
+        elapsed = rng.uniform(0.0, dt) if stages else 0.0
+        motion = Trajectory(Limiter(MODEL.description).to_rest(v, dt), dt, elapsed)
+        path, times = motion.path(HOME, 100)
+        hand = MODEL.pose(path[rng.integers(len(path) // 4, 3 * len(path) // 4)]).position
+        velocity = rng.uniform(-0.5, 0.5, 3) * rng.integers(2)
+        lamp = Obstacle("lamp", Shape("sphere", [0.01]), hand, velocity=velocity)
         collision = CollisionModel(MODEL, (lamp,))
-        margins = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
-        now = HOME, collision.values(HOME[None])[0]
-        certificate = StopCertificate(collision, margins, span=1.0)
-        worst = certificate.along(path, np.zeros(len(path)), now).max(axis=0)[1]
-        missed = worst - certificate.violation(HOME, v, now).all
-        assert missed <= 0.5 * margins.max()
+        least, now = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins, collision.values(HOME[None])[0]
+        certificate = Certificate(collision, least, span=1.0)
+        short = (np.minimum(least, now - 1e-3) - collision.values(path, times)).max(axis=1)
+        violation = certificate.violation(motion, HOME, now)
+        assert short.max() - violation.all <= 0.5 * least.max()
+        assert violation.all <= 0.0 or violation.time <= motion.path(HOME)[1][-1] or velocity.any()
+        found += violation.all > 0.0
+    assert found > 20

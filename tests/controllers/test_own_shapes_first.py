@@ -5,9 +5,10 @@ import pytest
 from ideal_robot import HOME, LIMITS, MODEL, Robot, asking
 
 from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.controllers.safety.backup import Backup, Situation, full_stop
+from handrail.controllers.safety.backup import Backup, Situation
 from handrail.controllers.safety.certificate import Violation
 from handrail.controllers.safety.limiter import Limiter
 
@@ -37,18 +38,16 @@ def test_what_comes_too_near_buys_no_slack_to_the_robot_itself(speed):
 
 
 class Judge:
-    """Says that a full stop is unsafe to the robot itself; what is stored, more so, but only to a mover."""
+    """Says that a full stop is unsafe to the robot itself; what is followed, more so, but only to a mover."""
 
-    def violation(self, q, v, now, delay=0.0):
-        return Violation(hard=0.01, all=0.01)
-
-    def until_rest(self, path, times, now):
-        return Violation(hard=0.0, all=0.05)
+    def violation(self, motion, q, distances):
+        stops = np.abs(motion.velocities[1]).max() < np.abs(motion.velocities[0]).max()
+        return Violation(0.01, 0.01, 0.0) if stops else Violation(0.0, 0.05, 0.0)
 
 
 @pytest.mark.parametrize("halt", [True, False])
 def test_of_two_ways_that_are_not_safe_the_one_is_taken_that_keeps_from_itself(halt):
     backup, moving = Backup(Judge(), Limiter(MODEL.description), 0.1), 0.3 * LIMITS.velocity  # pyright: ignore
-    stored = full_stop(backup.limiter, moving, backup.dt)
-    way = backup.choose(Situation(HOME, moving, np.zeros(OWN), stored, 0.0), None, halt)
-    assert way.violation == (0.0, 0.05)
+    followed = Trajectory(backup.limiter.to_rest(np.stack([moving, moving]), backup.dt), backup.dt)
+    way = backup.choose(Situation(HOME, moving, np.zeros(OWN), followed, 0.0), None, halt)
+    assert way.violation == (0.0, 0.05, 0.0)
