@@ -1,11 +1,15 @@
 """Ctrl-C and SIGTERM while something is recorded or run."""
 
+import _thread
 import contextlib
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from types import FrameType
 from typing import Self
+
+_AGAIN = 0.01  # time after which an interrupt comes again [s]
 
 
 class Interrupts:
@@ -21,11 +25,13 @@ class Interrupts:
         hears = threading.current_thread() is threading.main_thread()
         signals = self._SIGNALS if hears else ()
         self._previous = {number: signal.signal(number, self._interrupt) for number in signals}
+        self._unraisable, sys.unraisablehook = sys.unraisablehook, self._again
         return self
 
     def __exit__(self, kind: type[BaseException] | None = None, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
+        sys.unraisablehook = self._unraisable
         if self._asked and (outer := _current()):
             outer._asked = True
         if self._asked and kind is SystemError:  # a compiled library made it of the interrupt
@@ -51,6 +57,13 @@ class Interrupts:
         self._asked = True
         if not self._deferring:
             raise KeyboardInterrupt
+
+    def _again(self, lost: "sys.UnraisableHookArgs") -> None:
+        """Let an interrupt come again that was raised in a destructor or callback: Python drops it there."""
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            threading.Timer(_AGAIN, _thread.interrupt_main).start()
+        else:
+            self._unraisable(lost)
 
 
 def interrupted() -> bool:
