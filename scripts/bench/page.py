@@ -16,7 +16,7 @@ _PATIENCE = 300.0  # until a frame is as it is waited for [s]
 def connected(address: str, name: str, **options: Any) -> ClientConnection:
     """Return the connection of a page."""
     parts = urlsplit(address)
-    return connect(
+    made = connect(
         f"ws://{parts.netloc}/drive?page={name}",
         origin=Origin(f"{parts.scheme}://{parts.netloc}"),
         compression=None,
@@ -25,6 +25,7 @@ def connected(address: str, name: str, **options: Any) -> ClientConnection:
         open_timeout=_PATIENCE,
         **options,
     )
+    return made.__enter__()  # whoever asked closes it
 
 
 class Page:

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 import sys
 from dataclasses import dataclass
 from typing import Any
@@ -56,3 +57,10 @@ def refused(*arguments: Any, name: str = "record", told: str = "") -> str:
     assert done.stderr.startswith("error: ")
     assert told in done.stderr, done.stderr
     return done.stderr
+
+
+def flags_of(name: str, help: str = "--help-all") -> set[str]:
+    """Return the flags of a command, from its own help."""
+    shown = command(help, name=name.removeprefix("handrail-")).stdout
+    rows = re.findall(r"^[│ ] ((?:-[\w.-]+(?:, )?)+)", shown, re.MULTILINE)
+    return {flag for row in rows for flag in row.split(", ")}

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 import pytest
-from command_helpers import command
+from command_helpers import flags_of
 from lerobot.configs.dataset import DatasetRecordConfig
 from lerobot.configs.default import EvalConfig
 from lerobot.envs.configs import EnvConfig
@@ -37,13 +37,6 @@ FOREIGN = {
     "scripts/bench/latency/measure.py",
 }
 FOREIGN |= {"scripts/bench/soak/child.py", "scripts/bench/soak/notes.py"}
-
-
-def flags_of(name: str) -> set[str]:
-    """Return the flags of a command, from its own help."""
-    shown = command("--help-all", name=name.removeprefix("handrail-")).stdout
-    rows = re.findall(r"^[│ ] ((?:-[\w.-]+(?:, )?)+)", shown, re.MULTILINE)
-    return {flag for row in rows for flag in row.split(", ")}
 
 
 @pytest.fixture(scope="module")

@@ -100,6 +100,18 @@ def test_the_page_needs_nothing_else(foreign_report):
     assert page.index("headline") < page.index('class="card"') < page.index('class="panels')
 
 
+def test_the_page_says_which_episodes_to_look_at_first(foreign_report):
+    (comparison, _, _), page = foreign_report
+    section = page.split("Episodes to look at first")[1].split("</section>")[0]
+    shaky = section.split("<summary>shaky</summary>")[1].split("</details>")[0]
+    (metric,) = [metric for metric in METRICS if metric.name == "sparc"]
+    ((told, command),) = re.findall(rf">{re.escape(metric.title)}</td><td>(.*?)</td><td>(.*?)</td>", shaky)
+    values = comparison.everything.measurements.values["sparc"]["shaky"].values
+    worst = [str(number) for number in np.argsort(values)[:3]]  # more negative is less smooth
+    assert re.findall(r"(\d+) \(", told) == worst
+    assert all(number in command for number in worst)
+
+
 def test_the_same_seed_gives_the_same_report(ours, tmp_path):
     for name in ("one", "two"):
         report(ours, tmp_path / name)

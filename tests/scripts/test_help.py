@@ -1,0 +1,42 @@
+"""Laws of the help: `handrail` lists the commands and takes them as words; help has two layers."""
+
+import sys
+
+import pytest
+from command_helpers import flags_of
+
+from handrail.scripts.__main__ import main
+from handrail.scripts.commands import COMMANDS, GROUPS
+
+
+def said(capsys, monkeypatch, *words):
+    """Return what `handrail WORDS` prints."""
+    monkeypatch.setattr(sys, "argv", ["handrail", *words])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert not stopped.value.code
+    return capsys.readouterr().out
+
+
+def test_handrail_alone_lists_the_commands_by_what_a_person_wants(capsys, monkeypatch):
+    shown = said(capsys, monkeypatch)
+    places = [shown.index(f"\n{group}\n") for group in GROUPS]
+    assert places == sorted(places)
+    for name, each in COMMANDS.items():
+        assert f"  {name:10}  {each.help}\n" in shown
+
+
+def test_commands_are_words_too(capsys, monkeypatch):
+    assert said(capsys, monkeypatch, "record", "--version").startswith("handrail record ")
+    assert "--episodes" in said(capsys, monkeypatch, "edit", "delete", "--help")
+
+
+@pytest.mark.parametrize("name", ["record", "cockpit", "train", "compare"])
+def test_help_shows_the_fewer_flags_of_those_that_help_all_shows(name):
+    assert flags_of(name, "--help") < flags_of(name)
+
+
+def test_the_cockpit_s_help_shows_no_flag_that_cannot_matter_there():
+    every, meaningless = flags_of("cockpit"), ("--operator", "--noise", "--human.", "--teleop.")
+    assert not [flag for flag in every if flag.startswith((*meaningless, "--client.", "--workers", "--ray"))]
+    assert "--cockpit.port" in every
