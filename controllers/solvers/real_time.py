@@ -37,9 +37,9 @@ class RealTimeSolver:
     def solve(self, problem: Problem, guess: FloatArray, active: IntArray = NOTHING_ACTIVE) -> Plan:
         """Return the plan after one step from a guess; its `solved` says whether it is one.
 
-        Right after the intent or the scene has jumped, the guess is far off; a step that is still large, and
-        did not lead where its linearisation said, is followed by another. The work of an update is bounded:
-        the plan reached when it is spent is certified like any other.
+        Right after the intent or the scene has jumped, the guess is far off; a step that did not lead where
+        its linearisation said is followed by another. The work of an update is bounded: the plan reached
+        when it is spent is certified like any other.
 
         Args:
             problem: of this update.
