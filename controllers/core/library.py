@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -81,20 +82,12 @@ class Memory:
     """
 
     def __init__(self, name: str, sizes: dict[str, int], given: dict[str, np.ndarray] | None = None) -> None:
-        body = re.search(rf"typedef struct {{\n((?:(?!typedef).)*?)\n}} {name};", _HEADER, re.DOTALL)
-        assert body, name
-        fields: list[tuple[str, Any]] = []
+        structure, layout = _layout(name)
         arrays = dict(given or {})
-        for line in body[1].splitlines():
-            if function := _MEMBER.match(line):
-                fields.append((function[2], _CALLBACK[function[1]]))
-            elif field := _FIELD.match(line):
-                kind, pointer, label, shape = field.groups()
-                single, many = _NUMBER[kind]
-                fields.append((label, ctypes.c_void_p if pointer else single))
-                if pointer and label not in arrays:
-                    arrays[label] = np.zeros(_shape(shape, sizes), many)
-        self.fields = type(name, (ctypes.Structure,), {"_fields_": fields})()
+        for label, (number, shape) in layout.items():
+            if label not in arrays:
+                arrays[label] = np.zeros(eval(shape, dict(sizes)), number)
+        self.fields = structure()
         self.address = ctypes.byref(self.fields)
         for label, size in sizes.items():
             setattr(self.fields, label, size)
@@ -111,6 +104,20 @@ class Memory:
         setattr(self.fields, name, kind(function))
 
 
-def _shape(text: str, sizes: dict[str, int]) -> tuple[int, ...]:
-    parts = [part for part in text.split(",") if part.strip()]
-    return tuple(int(eval(part, {}, dict(sizes))) for part in parts)
+@cache
+def _layout(name: str) -> tuple[type[ctypes.Structure], dict[str, tuple[type, CodeType]]]:
+    """Return a structure of core.h, and the numbers and the shape of each of its arrays."""
+    body = re.search(rf"typedef struct {{\n((?:(?!typedef).)*?)\n}} {name};", _HEADER, re.DOTALL)
+    assert body, name
+    fields: list[tuple[str, Any]] = []
+    arrays: dict[str, tuple[type, CodeType]] = {}
+    for line in body[1].splitlines():
+        if function := _MEMBER.match(line):
+            fields.append((function[2], _CALLBACK[function[1]]))
+        elif field := _FIELD.match(line):
+            kind, pointer, label, shape = field.groups()
+            single, many = _NUMBER[kind]
+            fields.append((label, ctypes.c_void_p if pointer else single))
+            if pointer:
+                arrays[label] = many, compile(f"({shape})", "core.h", "eval")
+    return type(name, (ctypes.Structure,), {"_fields_": fields}), arrays

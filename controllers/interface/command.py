@@ -17,8 +17,8 @@ class Status(StrEnum):
     INVALID_STATE = "invalid_state"  # the same, or its clock does not advance
     INVALID_SCENE = "invalid_scene"  # two things of one name, or one held by a frame that the robot lacks
     STALE_INTENT = "stale_intent"
-    SOLVER_FAILED = "solver_failed"  # the stored backup is followed
-    BACKUP = "backup"  # the plan leaves no safe way out: the stored backup is followed
+    SOLVER_FAILED = "solver_failed"  # the robot follows what it was sent, or stops
+    BACKUP = "backup"  # the plan leaves no safe way out: the same
 
     @property
     def brakes(self) -> bool:
