@@ -18,7 +18,7 @@ NEXT = """Next:
   {bin}handrail-replay {root}
   {bin}handrail-record {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
   {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0 \
-      --save 1 --output-dir {folder}    # extra: display; without --save it needs a screen
+--save 1 --output-dir {folder}    # extra: display; without --save it needs a screen
   {bin}handrail-record --help"""
 
 
