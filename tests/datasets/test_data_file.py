@@ -3,7 +3,6 @@
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -36,19 +35,3 @@ def test_an_episode_is_found_however_its_file_is_cut(made, tmp_path_factory):
             expected = np.flatnonzero(owner == episode).tolist()
             found = opened.open(path).rows(episode, len(expected), ["place"])
             assert found.column("place").to_pylist() == expected
-
-
-def test_the_last_few_files_stay_open(tmp_path, monkeypatch):
-    monkeypatch.setattr(data_file, "MOST_OPEN", 2)
-    one, two, three = paths = [tmp_path / name for name in "abc"]
-    for path in paths:
-        pq.write_table(pa.table({"episode_index": [0, 1]}), path)
-    with data_file.data_files() as files:
-        first, second = files.open(one), files.open(two)
-        assert files.open(one) is first
-        files.open(three)  # and the second, which was asked for least lately, is closed
-        assert files.open(one) is first
-        assert files.open(two) is not second
-    for closed in (first, second):
-        with pytest.raises(ValueError, match="closed"):
-            closed.rows(0, 1)

@@ -4,6 +4,8 @@ import json
 import os
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from canned import copied
 from command_helpers import command, refused
@@ -80,6 +82,12 @@ def _spoil(root, change):
     path.write_text(json.dumps(json.loads(path.read_bytes()) | change))
 
 
+def _redescribe(root, name, **entries):
+    described = json.loads(Layout(root).info.read_bytes())["features"]
+    described[name] |= entries
+    _spoil(root, {"features": described})
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -118,9 +126,7 @@ def test_info_is_not_trusted(root, change):
 
 def test_a_type_that_numpy_would_make_room_for_is_not_read(root):
     """`V1000000000` is a type of numpy's; a column of it would be a gigabyte a number."""
-    described = json.loads(Layout(root).info.read_bytes())["features"]
-    described["action"]["dtype"] = "V1000000000"
-    _spoil(root, {"features": described})
+    _redescribe(root, "action", dtype="V1000000000")
     done = command("--dataset.root", root, name="inspect")
     assert done.returncode in (0, 2)
     assert "Traceback" not in done.stderr
@@ -138,9 +144,6 @@ def test_a_camera_cannot_lead_out_of_the_dataset():
 @pytest.mark.parametrize("column", ["episode_index", "length", "data/chunk_index", "data/file_index"])
 @pytest.mark.parametrize("harm", ["gone", "text", "negative", "empty"])
 def test_a_line_of_metadata_is_not_trusted(root, column, harm):
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     path = Layout(root).row(1)
     table, place = pq.read_table(path), pq.read_schema(path).names.index(column)
     changed = {"text": pa.array(["../.."]), "negative": pa.array([-1]), "empty": pa.array([None], pa.int64())}
@@ -153,9 +156,6 @@ def test_a_line_of_metadata_is_not_trusted(root, column, harm):
 
 @pytest.mark.parametrize("tasks", [["go"], [[1, 2]], [[None]]])
 def test_tasks_that_are_no_texts_are_one_line(root, tasks):
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     path = Layout(root).row(1)
     table = pq.read_table(path)
     pq.write_table(table.set_column(table.schema.names.index("tasks"), "tasks", pa.array(tasks)), path)
@@ -164,8 +164,6 @@ def test_tasks_that_are_no_texts_are_one_line(root, tasks):
 
 
 def test_tasks_may_be_missing(root):
-    import pyarrow.parquet as pq
-
     pq.write_table(pq.read_table(Layout(root).row(1)).drop_columns(["tasks"]), Layout(root).row(1))
     assert [row["tasks"] for row in read_episodes(root)][1] == []
 
@@ -173,18 +171,14 @@ def test_tasks_may_be_missing(root):
 @pytest.mark.parametrize("names", [["tool.z"], [f"{axis}.pos" for axis in "abcd"] + ["x", "y", "z"]])
 def test_names_of_something_else_are_no_names(root, names):
     """Half of the readers would look beyond the numbers for the tool."""
-    described = json.loads(Layout(root).info.read_bytes())["features"]
-    described["observation.state"]["names"] = names
-    _spoil(root, {"features": described})
+    _redescribe(root, "observation.state", names=names)
     assert read_info(root).features["observation.state"].names is None
     assert len(summarize(root)) == 2
 
 
 @pytest.mark.parametrize("shape", [[], [1], [2, 2], [100]])
 def test_a_column_of_another_shape_is_one_line(root, shape):
-    described = json.loads(Layout(root).info.read_bytes())["features"]
-    described["observation.state"] |= {"shape": shape, "names": ["a.pos"]}
-    _spoil(root, {"features": described})
+    _redescribe(root, "observation.state", shape=shape, names=["a.pos"])
     with pytest.raises(HandrailError, match=r"\A[^\n]{1,500}\Z"):
         read_frames(root, 0)
 

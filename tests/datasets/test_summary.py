@@ -1,10 +1,8 @@
 """Any LeRobot dataset can be summed up; what it does not hold is shown as a dash."""
 
-import warnings
-
 import numpy as np
 import pytest
-from datasets_helpers import FPS, REPO, ROBOT, record
+from datasets_helpers import FPS, REPO, ROBOT, record, record_with_lerobot
 
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
@@ -90,30 +88,20 @@ def test_without_a_tool_the_configuration_is_judged(tmp_path):
 
 
 def test_a_dataset_of_lerobot_s_own(tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+    features = {
+        "observation.state": {"dtype": "float32", "shape": (2,), "names": {"motors": ["a", "b"]}},
+        "action": {"dtype": "float32", "shape": (1,), "names": None},
+        "matrix": {"dtype": "float32", "shape": (2, 3), "names": None},
+        "flags": {"dtype": "bool", "shape": (3,), "names": None},
+    }
 
-        features = {
-            "observation.state": {"dtype": "float32", "shape": (2,), "names": {"motors": ["a", "b"]}},
-            "action": {"dtype": "float32", "shape": (1,), "names": None},
-            "matrix": {"dtype": "float32", "shape": (2, 3), "names": None},
-            "flags": {"dtype": "bool", "shape": (3,), "names": None},
-        }
-        dataset = LeRobotDataset.create(REPO, FPS, features, root=tmp_path / "set")
-        for episode in range(3):
-            for index in range(4 + episode):
-                dataset.add_frame(
-                    {
-                        "observation.state": np.array([episode, index], np.float32),
-                        "action": np.array([index], np.float32),
-                        "matrix": np.full((2, 3), index, np.float32),
-                        "flags": np.arange(3) == index % 3,
-                        "task": "push",
-                    }
-                )
-            dataset.save_episode()
-        dataset.finalize()
+    def frame(episode, index):
+        state, action = np.array([episode, index], np.float32), np.array([index], np.float32)
+        other = {"matrix": np.full((2, 3), index, np.float32), "flags": np.arange(3) == index % 3}
+        return {"observation.state": state, "action": action, "task": "push", **other}
+
+    episodes = [[frame(episode, index) for index in range(4 + episode)] for episode in range(3)]
+    record_with_lerobot(tmp_path / "set", features, episodes)
     info = read_info(tmp_path / "set")
     assert (info.episodes, info.frames, info.from_handrail) == (3, 15, False)
     assert info.features["observation.state"].names == ("a", "b")

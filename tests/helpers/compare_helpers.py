@@ -1,12 +1,10 @@
 """Shared by the tests of `handrail-compare`: datasets of another robot by plain LeRobot, and our own."""
 
 import json
-import warnings
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from datasets_helpers import REPO, create
+from datasets_helpers import create, record_with_lerobot
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from handrail.datasets.comparison.evaluations import FORMAT, Condition, Policy
@@ -18,46 +16,25 @@ CAMERA = "observation.images.top"
 EPISODES, FRAMES = 6, 24
 
 
-def _write(root: Path, robot: str, names: list[str], fps: int, episodes: Iterable, camera: bool) -> Path:
-    """Record with plain LeRobot episodes of (state, action, level of the picture)."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from lerobot.datasets.lerobot_dataset import LeRobotDataset
-
-        vector = {"dtype": "float32", "shape": (len(names),), "names": names}
-        features = {"observation.state": vector, "action": vector}
-        if camera:
-            axes = ["height", "width", "channels"]
-            features[CAMERA] = {"dtype": "video", "shape": (32, 48, 3), "names": axes}
-        dataset = LeRobotDataset.create(REPO, fps, features, root=root, robot_type=robot)
-        for episode in episodes:
-            for state, action, level in episode:
-                picture = {CAMERA: np.full((32, 48, 3), level, np.uint8)} if camera else {}
-                dataset.add_frame(
-                    {
-                        "observation.state": state.astype(np.float32),
-                        "action": action.astype(np.float32),
-                        "task": "wave",
-                        **picture,
-                    }
-                )
-            dataset.save_episode()
-        dataset.finalize()
-    return root
-
-
 def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camera: bool) -> Path:
-    """Record an arm that follows commanded positions one frame later."""
+    """Record with plain LeRobot an arm that follows commanded positions one frame later."""
     rng = np.random.default_rng(len(names))
+    vector = {"dtype": "float32", "shape": (len(names),), "names": names}
+    features = {"observation.state": vector, "action": vector}
+    if camera:
+        axes = ["height", "width", "channels"]
+        features[CAMERA] = {"dtype": "video", "shape": (32, 48, 3), "names": axes}
 
     def episode(number: int):
-        state = np.zeros(len(names))
+        state = np.zeros(len(names), np.float32)
+        picture = {CAMERA: np.full((32, 48, 3), 40 * number, np.uint8)} if camera else {}
         for index in range(FRAMES + 3 * number):
             action = np.sin(0.1 * index + np.arange(len(names))) + jitter * rng.normal(size=len(names))
-            yield state, action, 40 * number
+            action = action.astype(np.float32)
+            yield {"observation.state": state, "action": action, "task": "wave", **picture}
             state = action
 
-    return _write(root, "so101", names, fps, map(episode, range(EPISODES)), camera)
+    return record_with_lerobot(root, features, map(episode, range(EPISODES)), fps, "so101")
 
 
 def handrail_dataset(root: Path, fail_every: int, mode: str, episodes: int = 12, slow: int = 0) -> str:

@@ -4,6 +4,7 @@ import hashlib
 import os
 import tempfile
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
+from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.writer import EpisodeWriter
 
 FPS = 30
@@ -124,6 +126,23 @@ def open_with_lerobot(root: Path, **options) -> Any:
         return LeRobotDataset(REPO, root=root, video_backend="pyav", **options)
 
 
+def record_with_lerobot(
+    root: Path, features: dict, episodes: Iterable, fps: int = FPS, robot: str = ""
+) -> Path:
+    """Record episodes, each some frames, with unmodified LeRobot."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+        dataset = LeRobotDataset.create(REPO, fps, features, root=root, robot_type=robot or ROBOT)
+        for episode in episodes:
+            for frame in episode:
+                dataset.add_frame(frame)
+            dataset.save_episode()
+        dataset.finalize()
+    return root
+
+
 def check_pictures(dataset, rows) -> None:
     """Check that the pictures that LeRobot shows for some rows are those recorded with them."""
     for row in rows:
@@ -133,11 +152,26 @@ def check_pictures(dataset, rows) -> None:
             assert abs(float(item[key].mean()) * 255 - expected) < 2.5
 
 
-def fails(action, *words: str) -> None:
-    """Check that an action is refused in one line with some words."""
+def fails(action, *words: str, unchanged: Path | None = None) -> None:
+    """Check that an action is refused with some words, and leaves a folder as it was."""
+    before = tree(unchanged) if unchanged else None
     with pytest.raises(HandrailError) as caught:
         action()
-    message = str(caught.value)
-    assert "\n" not in message
     for word in words:
-        assert word in message, message
+        assert word in str(caught.value)
+    assert before is None or tree(unchanged) == before
+
+
+def check_is(root: Path, originals: Iterable[int]) -> None:
+    """Check that the episodes are, in order, those that were recorded under these numbers."""
+    rows, start = read_episodes(root), 0
+    assert [row["seed"] for row in rows] == list(originals)
+    for place, number in enumerate(originals):
+        row, frames = rows[place], read_frames(root, place)
+        assert (row["episode_index"], row["dataset_from_index"]) == (place, start)
+        assert row["length"] == length_of(number)
+        expected = [frame_of(number, i, cameras=False)["action"] for i in range(length_of(number))]
+        assert np.array_equal(frames["action"], np.array(expected))
+        assert frames["index"].tolist() == list(range(start, start + length_of(number)))
+        assert set(frames["episode_index"]) == {place}
+        start += length_of(number)

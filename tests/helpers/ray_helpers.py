@@ -2,7 +2,6 @@
 
 import os
 import threading
-import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 from unittest import mock
@@ -43,12 +42,10 @@ class Loss:
     Attributes:
         kept: episodes that were saved when the computer was lost.
         twice: episodes of the dataset that are not those that were saved then, though their number was.
-        seconds: how long the command took [s].
     """
 
     kept: int
     twice: int
-    seconds: float
 
 
 def record_with_a_loss(cluster, root, episodes, *flags):
@@ -63,12 +60,10 @@ def record_with_a_loss(cluster, root, episodes, *flags):
 
     losing = threading.Thread(target=lose, daemon=True)
     losing.start()
-    start = time.monotonic()
     done = command(root, *flags, "--dataset.num_episodes", episodes, "--ray", cluster.address)
-    seconds = time.monotonic() - start
     assert done.returncode == 0, done.stderr
     losing.join()
-    return Loss(len(begun), len(set(begun) - set(started(root))), seconds)
+    return Loss(len(begun), len(set(begun) - set(started(root))))
 
 
 def _place(path):

@@ -33,7 +33,7 @@ class TerminalPlayer:
         fcntl.ioctl(slave, termios.TIOCSWINSZ, _SIZE)
         command = [sys.executable, "-m", "handrail.scripts", name, *arguments]
         self._child = subprocess.Popen(
-            command, stdin=slave, stdout=slave, stderr=slave, preexec_fn=_own_terminal
+            command, stdin=slave, stdout=slave, stderr=slave, preexec_fn=own_terminal
         )
         os.close(slave)
         self._said = ""
@@ -90,6 +90,6 @@ class TerminalPlayer:
             time.sleep(period)
 
 
-def _own_terminal() -> None:
+def own_terminal() -> None:
     os.setsid()
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)

@@ -13,8 +13,10 @@ from handrail.collect.devices.calibration import (
     calibration_file,
     how_to_calibrate,
     load_calibration,
+    same_arm,
     save_calibration,
 )
+from handrail.collect.devices.follower import Follower
 from handrail.collect.devices.guided_calibration import calibrate
 from handrail.collect.devices.leader_arm import make_teleoperator
 from handrail.collect.teleop_config import CalibrateConfig, LeaderConfig
@@ -160,3 +162,28 @@ def test_lerobots_own_settings_are_checked_by_lerobot_and_said_in_one_line(confi
     with pytest.raises(HandrailError, match=said) as error:
         make_teleoperator(config)
     assert config.type in str(error.value)
+
+
+def test_the_arm_goes_as_many_degrees_as_its_leader():
+    model = load_model("lekiwi")
+    arm = model.description.arm_joints
+    calibration = same_arm(LeaderConfig("so101_leader"), arm)
+    follower, q = Follower(model, calibration), model.description.home
+    leader = {f"{name}.pos": 10.0 * index for index, name in enumerate(arm)} | {"gripper.pos": 10.0}
+    follower.targets(leader, True, q)
+    turned = {name: value + 5.0 for name, value in leader.items()}
+    assert np.array(follower.targets(turned, True, q)) - q[3:] == pytest.approx(np.radians([5.0] * 5))
+    assert follower.grips(leader, False)
+    assert not follower.grips({**leader, "gripper.pos": 90.0}, True)
+
+
+@pytest.mark.parametrize(
+    ("leader", "options", "robot"),
+    [
+        ("koch_leader", "", "lekiwi"),
+        ("so101_leader", "use_degrees=false", "lekiwi"),
+        ("so101_leader", "", "ridgeback_ur10"),
+    ],
+)
+def test_any_other_pair_is_calibrated(leader, options, robot):
+    assert same_arm(LeaderConfig(leader, options=options), load_model(robot).description.arm_joints) is None

@@ -3,30 +3,15 @@
 import sys
 
 import pytest
-from device_players import Clock, VirtualPad, recorded
+from device_players import Clock, recorded
 
 from handrail.collect.devices import gamepad
 from handrail.collect.devices.gamepad import Gamepad
 from handrail.controllers.errors import HandrailError
 
 
-@pytest.fixture(scope="module")
-def sdl():
-    pad = VirtualPad()
-    with pytest.raises(HandrailError):  # also begins SDL, without which there is nothing to plug in
-        Gamepad().open()
-    return pad
-
-
 @pytest.fixture
-def plugged(sdl):
-    sdl.plug_in()
-    yield sdl
-    sdl.unplug()
-
-
-@pytest.fixture
-def pad(plugged):
+def opened(pad):
     made = Gamepad(clock=Clock())
     made.open()
     made.read()
@@ -34,11 +19,11 @@ def pad(plugged):
     made.close()
 
 
-def test_recorded_events_come_out_as_deflections_and_presses(plugged, pad):
+def test_recorded_events_come_out_as_deflections_and_presses(pad, opened):
     at = {}
     for event in recorded("gamepad.json"):
-        plugged.move(event["control"], event["value"])
-        reading = pad.read()
+        pad.move(event["control"], event["value"])
+        reading = opened.read()
         at[event["time"]] = {k: round(v, 2) for k, v in reading.deflections.items()}, reading.presses
     assert at[0.0] == ({}, ())  # a worn stick
     assert at[0.2] == ({"left_shoulder": 1.0}, ("left_shoulder",))
@@ -54,24 +39,25 @@ def test_recorded_events_come_out_as_deflections_and_presses(plugged, pad):
     assert at[2.1][1] == ("b",)
 
 
-def test_unplugged_it_is_gone_and_says_what_to_do(plugged, pad):
-    plugged.move("left_y", -1.0)
-    assert pad.read().deflections
-    plugged.unplug()
+def test_unplugged_it_is_gone_and_says_what_to_do(pad, opened):
+    pad.move("left_y", -1.0)
+    assert opened.read().deflections
+    pad.unplug()
     with pytest.raises(HandrailError, match="plug it in again"):
-        pad.read()
-    plugged.plug_in()
-    pad.close()
-    pad.open()
-    assert not pad.read().deflections
+        opened.read()
+    pad.plug_in()
+    opened.close()
+    opened.open()
+    assert not opened.read().deflections
 
 
-def test_without_one_it_says_what_to_do(sdl):
+def test_without_one_it_says_what_to_do(pad):
+    pad.unplug()
     with pytest.raises(HandrailError, match="expected one, found none; plug it in"):
         Gamepad().open()
 
 
-def test_one_that_may_not_be_read_says_which_group(sdl, tmp_path, monkeypatch):
+def test_one_that_may_not_be_read_says_which_group(pad, tmp_path, monkeypatch):
     class Closed:
         def __init__(self, path):
             pass
@@ -79,6 +65,7 @@ def test_one_that_may_not_be_read_says_which_group(sdl, tmp_path, monkeypatch):
         def glob(self, pattern):
             return [tmp_path / "js0"]
 
+    pad.unplug()
     monkeypatch.setattr(gamepad, "Path", Closed)
     with pytest.raises(HandrailError, match=r"js0 may not be read; .* usermod -aG input"):
         Gamepad().open()

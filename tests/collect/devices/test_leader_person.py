@@ -45,18 +45,6 @@ def test_the_arm_moves_as_the_leader_does_since_the_clutch_held(driven):
     assert not moved[2:].any()
 
 
-def test_let_go_the_arm_stands_and_the_leader_may_be_put_elsewhere(driven):
-    clutch(driven)
-    arm(driven)
-    turn(driven, pan=5.0)
-    assert arm(driven).any()
-    clutch(driven, False)
-    turn(driven, pan=-60.0)
-    assert not arm(driven).any()
-    clutch(driven)
-    assert np.abs(arm(driven)).max() < 1e-9
-
-
 def test_recorded_motion_is_followed_by_the_same_angle(driven):
     """The arm goes where it is told at once here; the leader turns by 17.4 degrees."""
     driven.person.ask(Ask("speed", 1.0))

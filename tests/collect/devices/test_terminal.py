@@ -1,6 +1,5 @@
 """Laws of the terminal: taken key by key, nothing echoed, put back; one line where there is none."""
 
-import fcntl
 import os
 import pty
 import select
@@ -10,6 +9,7 @@ import termios
 import time
 
 import pytest
+from terminal_player import own_terminal
 
 from handrail.collect.devices.keyboard import KeyTerminal, has_terminal
 from handrail.controllers.errors import HandrailError
@@ -31,11 +31,6 @@ terminal.close()
 print("got", got, flush=True)
 sys.stdin.readline()
 """
-
-
-def own_terminal():
-    os.setsid()
-    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
 
 def until(master, words, patience=20.0):

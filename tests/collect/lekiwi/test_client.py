@@ -1,5 +1,6 @@
 """handrail-record drives a LeKiwi through LeRobot's client: here one in this process, in its own time."""
 
+import logging
 import math
 from unittest import mock
 
@@ -7,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_helpers import command, refused
-from lekiwi_helpers import ZERO, PlayedClient
+from lekiwi_helpers import ZERO, FarClient, PlayedClient, rude_drive
 
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
@@ -16,6 +17,7 @@ from handrail.collect.lekiwi.client_plant import ClientPlant
 from handrail.collect.lekiwi.link import Link
 from handrail.collect.world.scene import Scene, Viewpoint
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.reading.reader import read_episodes
 
@@ -124,3 +126,25 @@ def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
 def test_wrong_flags_are_named(tmp_path, flags, words):
     refused(tmp_path / "set", "--task", "reach", *flags, told=words)
     assert not (tmp_path / "set").exists()
+
+
+@pytest.mark.parametrize("seeds", [1, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("gap", "latency", "drop"), [(0.25, 0, 0), (0.45, 0, 0), (1, 0, 0), (0, 0.1, 0.1)])
+def test_delays_touch_nothing(gap, latency, drop, seeds):
+    with single_threaded():
+        found = [rude_drive(gap, latency, drop, seed, seconds=10.0) for seed in range(seeds)]
+    assert not any(contacts for contacts, _ in found)
+    assert gap or found[0][1] > 0.3  # a robot that never moves touches nothing, too
+
+
+def test_a_base_whose_next_command_is_late_is_sent_the_stop_and_that_is_said(caplog):
+    client = FarClient(0.0, 0.0, 0)
+    link = client.link = Link(client, "lekiwi", load_model("lekiwi"), 0.05, False, client.clock, client.sleep)
+    for _ in range(10):
+        link.exchange([0.1, 0, 0, 0, 0, 0, 0, 0, 0])
+    assert client.body.speed > 0.08
+    client.sleep(0.45)  # less than the host's watchdog takes
+    assert client.body.speed < 0.01
+    with caplog.at_level(logging.WARNING):
+        link.close()
+    assert "commands were late" in caplog.text

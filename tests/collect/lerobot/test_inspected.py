@@ -1,10 +1,9 @@
 """A dataset that `lerobot-record` makes of `handrail_sim` says in a table how its episodes went."""
 
-import warnings
-
 import numpy as np
 import pytest
 from command_helpers import command
+from datasets_helpers import record_with_lerobot
 from lerobot_helpers import steered
 
 from handrail.collect.lerobot import HandrailSim
@@ -30,25 +29,17 @@ def recorded(tmp_path_factory):
             seen[1].append(robot.get_observation())
             robot.send_action(robot.action.still() | {NEXT: float(len(seen[1]) == 1)})
     seen[1][4]["contacts"], seen[1][5]["contacts"] = 2.0, 1.0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from lerobot.datasets.lerobot_dataset import LeRobotDataset
-
-        names = list(seen[0][0])
-        features = {
-            "observation.state": {"dtype": "float32", "shape": (len(names),), "names": names},
-            "action": {"dtype": "float32", "shape": (1,), "names": ["gripper"]},
-        }
-        root = folder / "set"
-        dataset = LeRobotDataset.create("me/reach", FPS, features, root=root, robot_type=HandrailSim.name)
-        for episode in seen:
-            for row in episode:
-                state = np.array(list(row.values()), np.float32)
-                dataset.add_frame(
-                    {"observation.state": state, "action": np.zeros(1, np.float32), "task": "reach"}
-                )
-            dataset.save_episode()
-        dataset.finalize()
+    names = list(seen[0][0])
+    features = {
+        "observation.state": {"dtype": "float32", "shape": (len(names),), "names": names},
+        "action": {"dtype": "float32", "shape": (1,), "names": ["gripper"]},
+    }
+    rest = {"action": np.zeros(1, np.float32), "task": "reach"}
+    episodes = [
+        [{"observation.state": np.array(list(row.values()), np.float32), **rest} for row in episode]
+        for episode in seen
+    ]
+    root = record_with_lerobot(folder / "set", features, episodes, FPS, HandrailSim.name)
     return root, seen
 
 

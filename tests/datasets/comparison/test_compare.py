@@ -175,34 +175,23 @@ def test_one_episode_is_enough_to_say_that_it_is_too_few(tmp_path):
     assert headline(comparison).count("no difference detected") == 1
 
 
-WRONG = {
-    "nothing": ([], "DATASETS|expected one folder"),
-    "one": (
-        ["{quick}"],
-        "expected 2 to 8 groups of episodes, got quick; name another dataset, or say --by mode",
-    ),
-    "no such": (["{quick}", "nowhere"], "nowhere.*expected a folder, found none"),
-    "column": (["{quick}", "{slow}", "--by", "colour"], "unknown column 'colour'"),
-    "labels": (["{quick}", "{slow}", "--labels", "a"], "--labels: expected 2 names, got 1"),
-    "same name": (["{quick}", "{quick}"], r"two datasets are called 'set/quick'"),
-    "baseline": (
-        ["{quick}", "{slow}", "--baseline", "z"],
-        "unknown baseline 'z': expected one of quick, slow",
-    ),
-    "margin": (["{quick}", "{slow}", "--margin", "-1"], "--margin: expected a number >= "),
-    "output": (
-        ["{quick}", "{slow}", "--output", "{quick}/meta/info.json"],
-        "expected a folder, found a file",
-    ),
-    "evaluations": (
-        ["{quick}", "{slow}", "--evaluations", "no.json"],
-        "no.json': expected evaluations",
-    ),
-    "flag": (["{quick}", "{slow}", "--speed", "9"], "--speed"),
-}
+BOTH = ("{quick}", "{slow}")
+WRONG = [
+    ((), "DATASETS|expected one folder"),
+    (("{quick}",), "expected 2 to 8 groups of episodes, got quick; name another dataset, or say --by mode"),
+    (("{quick}", "nowhere"), "nowhere.*expected a folder, found none"),
+    ((*BOTH, "--by", "colour"), "unknown column 'colour'"),
+    ((*BOTH, "--labels", "a"), "--labels: expected 2 names, got 1"),
+    (("{quick}", "{quick}"), r"two datasets are called 'set/quick'"),
+    ((*BOTH, "--baseline", "z"), "unknown baseline 'z': expected one of quick, slow"),
+    ((*BOTH, "--margin", "-1"), "--margin: expected a number >= "),
+    ((*BOTH, "--output", "{quick}/meta/info.json"), "expected a folder, found a file"),
+    ((*BOTH, "--evaluations", "no.json"), "no.json': expected evaluations"),
+    ((*BOTH, "--speed", "9"), "--speed"),
+]
 
 
-@pytest.mark.parametrize(("arguments", "message"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize(("arguments", "message"), WRONG)
 def test_wrong_input_is_one_line(arguments, message, ours):
     words = [word.format(quick=ours[0], slow=ours[1]) for word in arguments]
     line = refused(*words, name="compare")

@@ -45,20 +45,18 @@ def apart(needs, one, other) -> str:
 
 
 OTHER = replace(ARM, root=Path("other"))
+UNNAMED = replace(ARM, robot_type="")
+BARE = ("pan", "lift", "elbow")
 UNKNOWN = {
     "no names": (group(names=None), group(OTHER, names=None), "have no names"),
     "other names": (group(), group(OTHER, names=("x.pos", "y.pos", "z.pos")), "other entries in the"),
     "names that say nothing": (
-        group(names=("pan", "lift", "elbow")),
-        group(OTHER, names=("pan", "lift", "elbow")),
+        group(names=BARE),
+        group(OTHER, names=BARE),
         r"names in the .*pan, lift, elbow.* do not say whether it is positions or velocities",
     ),
     "other robot": (group(), group(replace(OTHER, robot_type="leg")), r"robots are not known .*arm and leg"),
-    "no robot": (
-        group(replace(ARM, robot_type="")),
-        group(replace(OTHER, robot_type="")),
-        "not recorded and not",
-    ),
+    "no robot": (group(UNNAMED), group(replace(UNNAMED, root=Path("other"))), "not recorded and not"),
     "one of ours": (group(OURS), group(OTHER), "robots are not known"),
     "other rate": (group(), group(OTHER, fps=50), "frame rates differ"),
     "degrees": (group(), group(OTHER, scale=57.3), r"are 5\d times as large"),

@@ -6,21 +6,19 @@ import json
 import os
 import random
 import shutil
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from datasets_guillotine import Guillotine, tear_staged_files
 from datasets_helpers import (
     TINY_FEATURES,
+    check_is,
     check_pictures,
     create,
     digest,
-    frame_of,
     length_of,
     open_with_lerobot,
     record,
@@ -28,10 +26,10 @@ from datasets_helpers import (
     resume,
     tree,
 )
+from killed_child import killed, run_command
 from places import HELPERS
 
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.repair import MOVED, repair
 from handrail.datasets.storage.lock import LOCK_NAME
 
@@ -60,19 +58,6 @@ def _session(root: Path, saved: dict[int, str]) -> None:
             saved[episode] = digest(root, episode, cameras=False)
 
 
-def _check_episodes(root: Path, count: int) -> None:
-    rows = read_episodes(root)
-    assert [row["episode_index"] for row in rows] == list(range(count))
-    start = 0
-    for episode, row in enumerate(rows):
-        assert (row["dataset_from_index"], row["length"]) == (start, length_of(episode))
-        frames = read_frames(root, episode)
-        assert frames["index"].tolist() == list(range(start, start + length_of(episode)))
-        expected = [frame_of(episode, i, cameras=False)["action"] for i in range(length_of(episode))]
-        assert np.array_equal(frames["action"], np.array(expected))
-        start += length_of(episode)
-
-
 def _check_after_kill(root: Path, saved: dict[int, str]) -> None:
     """The law: all that was reported is there to the byte, repair settles, and recording goes on."""
     if not Layout(root).manifest.exists():
@@ -91,7 +76,7 @@ def _check_after_kill(root: Path, saved: dict[int, str]) -> None:
     assert tree(root) == settled
     with resume(root, features=TINY_FEATURES) as writer:
         assert record_one(writer, cameras=False) == report.episodes
-    _check_episodes(root, report.episodes + 1)
+    check_is(root, range(report.episodes + 1))
     assert not (root / ".handrail").exists()
     assert not any(LOCK_NAME in path for path in tree(root))
 
@@ -126,28 +111,9 @@ def test_overwriting_killed_at_every_change(tmp_path, quick_collector):
         assert episodes in (0, 2)
         with resume(root, features=TINY_FEATURES) as writer:
             assert record_one(writer, cameras=False) == episodes
-        _check_episodes(root, episodes + 1)
+        check_is(root, range(episodes + 1))
         create(root, features=TINY_FEATURES, overwrite=True).close()
     assert k > 10
-
-
-def _damage(root: Path) -> list[bytes]:
-    """Damage episode 1; return what the files of the whole episodes hold that are not renumbered."""
-    layout = Layout(root)
-    os.truncate(layout.data(1), 100)
-    return [read_frames(root, episode)["action"].tobytes() for episode in (0, 2, 3)]
-
-
-def _check_nothing_lost(root: Path, kept: list[bytes]) -> None:
-    """However far a repair came, another one ends as if it had not been killed."""
-    repair(root)
-    assert repair(root, set_aside_damaged=True).episodes == 3
-    assert repair(root).clean
-    assert [row["seed"] for row in read_episodes(root)] == [0, 2, 3]
-    assert [read_frames(root, episode)["action"].tobytes() for episode in range(3)] == kept
-    assert Path(root / ".damaged").exists()
-    with resume(root, features=TINY_FEATURES) as writer:
-        assert record_one(writer, cameras=False) == 3
 
 
 @pytest.mark.parametrize(
@@ -155,8 +121,9 @@ def _check_nothing_lost(root: Path, kept: list[bytes]) -> None:
     [(False, 3), *(pytest.param(each, 1, marks=pytest.mark.slow) for each in (False, True))],
 )
 def test_repair_killed_at_every_change(tmp_path, quick_collector, torn, every):
+    """However far a repair came, another one ends as if it had not been killed."""
     original = record(tmp_path / "original", 4, features=TINY_FEATURES)
-    kept = _damage(original)
+    os.truncate(Layout(original).data(1), 100)
     if torn:
         Layout(original).info.write_bytes(b"{torn")
     for k in itertools.count(1, every):
@@ -164,29 +131,17 @@ def test_repair_killed_at_every_change(tmp_path, quick_collector, torn, every):
         lived = GUILLOTINE.run(root.parent, k, lambda root=root: repair(root, set_aside_damaged=True))
         if k % 2:
             tear_staged_files(root)
-        _check_nothing_lost(root, kept)
+        repair(root)
+        assert repair(root, set_aside_damaged=True).episodes == 3
+        assert repair(root).clean
+        check_is(root, [0, 2, 3])
+        assert Path(root / ".damaged").exists()
+        with resume(root, features=TINY_FEATURES) as writer:
+            assert record_one(writer, cameras=False) == 3
         assert list(root.parent.iterdir()) == [root]
         if lived:
             break
     assert k > 30
-
-
-def _run(folder: Path, k: int, *words: object) -> subprocess.CompletedProcess:
-    script = HELPERS / "killed_command.py"
-    command = [sys.executable, script, folder, k, *words]
-    return subprocess.run(list(map(str, command)), capture_output=True, text=True)
-
-
-def _killed(folder: Path, k: int, *words: object) -> bool:
-    """Run a command that kills itself at its k-th change below a folder; return whether it did."""
-    done = _run(folder, k, *words)
-    assert done.returncode in (-signal.SIGKILL, 0), done.stderr
-    return done.returncode == -signal.SIGKILL
-
-
-def _changes(folder: Path, *words: object) -> int:
-    """Return how many changes below a folder a command makes."""
-    return int(_run(folder, 0, *words).stderr.splitlines()[-1])
 
 
 @pytest.mark.slow
@@ -197,21 +152,19 @@ def test_compare_killed_10_times(tmp_path):
     roots = list(map(Path, quick_and_slow(tmp_path)))
     before = [tree(root) for root in roots]
     output = tmp_path / "report"
-    words = ("compare", *roots, "--output", output, "--no_pictures", "--seed")
-    assert not _killed(output, 0, *words, 0)
+    words = (run_command, "compare", *roots, "--output", output, "--no_pictures", "--seed")
+    assert not killed(output, 0, *words, 0)
     old = tree(output)
-    changes = _changes(output, *words, 0)
-    assert changes >= 2 * len(old)
     for number in range(10):
         shutil.rmtree(output)
         output.mkdir()
         for name, content in old.items():
             (output / name).write_bytes(content)
-        assert _killed(output, 1 + number % changes, *words, number)
+        assert killed(output, 1 + number % (2 * len(old)), *words, number)
         assert set(old) <= set(tree(output))
         assert all(_is_whole(output / name) for name in old)
         assert [tree(root) for root in roots] == before
-    assert not _killed(output, 0, *words, 0)
+    assert not killed(output, 0, *words, 0)
     assert tree(output) == old  # what a killed one left behind is gone
 
 

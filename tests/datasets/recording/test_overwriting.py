@@ -1,24 +1,29 @@
-"""What is there is overwritten only when asked, and only what is ours."""
+"""What is there is overwritten or dropped only when asked, only what is ours, and the rest stays whole."""
 
 import pytest
+from canned import copied
 from datasets_helpers import (
+    check_is,
     create,
     fails,
+    open_with_lerobot,
     record,
     record_one,
+    resume,
     tree,
 )
 
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.reading.reader import read_episodes
+from handrail.datasets.reading.check import check_report
+from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.repair import repair
 
 
 def test_an_existing_dataset_is_not_overwritten(tmp_path):
     root = record(tmp_path / "set", 1)
-    before = tree(root)
-    fails(lambda: create(root), str(root), "exists already", "resume", "overwrite")
-    assert tree(root) == before
+    fails(lambda: create(root), str(root), "exists already", "resume", "overwrite", unchanged=root)
 
 
 def test_an_existing_dataset_is_overwritten_when_asked(tmp_path):
@@ -46,9 +51,7 @@ def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
     (root / mine).write_text("mine")
     (root / "images").mkdir()
     (root / "images" / "photo.png").write_text("mine too")
-    before = tree(root)
-    fails(lambda: create(root, overwrite=True), mine, "--overwrite", "only its own")
-    assert tree(root) == before
+    fails(lambda: create(root, overwrite=True), mine, "--overwrite", "only its own", unchanged=root)
     (root / mine).unlink()
     create(root, overwrite=True).close()
     assert (root / "images" / "photo.png").read_text() == "mine too"
@@ -65,17 +68,63 @@ def test_what_was_set_aside_is_overwritten_with_the_rest(tmp_path):
 def test_a_dataset_of_another_tool_is_never_overwritten(tmp_path):
     root = record(tmp_path / "set", 1)
     Layout(root).manifest.unlink()
-    before = tree(root)
-    fails(lambda: create(root, overwrite=True), "not recorded by Handrail", "never removed")
-    assert tree(root) == before
+    words = ("not recorded by Handrail", "never removed")
+    fails(lambda: create(root, overwrite=True), *words, unchanged=root)
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_a_folder_that_is_no_dataset_is_never_removed(tmp_path, overwrite):
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
-    before = tree(tmp_path)
-    fails(lambda: create(tmp_path / "thesis", overwrite=overwrite), "chapter.tex", "never removed")
-    fails(lambda: create(tmp_path, overwrite=overwrite), "thesis", "never removed")
-    fails(lambda: create(tmp_path / "thesis" / "chapter.tex", overwrite=overwrite), "is a file")
-    assert tree(tmp_path) == before
+    for name, said in (("thesis", "chapter.tex"), ("", "thesis"), ("thesis/chapter.tex", "is a file")):
+        fails(lambda at=tmp_path / name: create(at, overwrite=overwrite), said, unchanged=tmp_path)
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    return copied(tmp_path / "d", record, 5)
+
+
+def odd(columns):
+    return columns["seed"] % 2 == 1
+
+
+def test_what_is_left_is_whole_and_moves_up(tmp_path):
+    recorded = copied(tmp_path / "d", record, 5, cameras=True)
+    before = {row["seed"]: read_frames(recorded, row["episode_index"]) for row in read_episodes(recorded)}
+    assert drop_episodes(recorded, odd) == 2
+    with resume(recorded, cameras=True) as writer:  # it goes on
+        assert writer.repaired.clean
+        assert record_one(writer, cameras=True) == 3
+    check_is(recorded, [0, 2, 4, 3])
+    assert not check_report(recorded)
+    for number, original in enumerate((0, 2, 4)):
+        frames, old = read_frames(recorded, number), before[original]
+        for name in set(old) - {"index", "episode_index", "task_index"}:
+            assert (frames[name] == old[name]).all(), name
+    assert open_with_lerobot(recorded).num_episodes == 4
+    assert not [path for path in recorded.parent.iterdir() if path != recorded]
+
+
+def test_nothing_to_drop_changes_nothing(recorded):
+    before = tree(recorded)
+    assert drop_episodes(recorded, lambda columns: False) == 0
+    assert tree(recorded) == before
+
+
+def test_without_episodes_there_is_no_dataset(recorded):
+    assert drop_episodes(recorded, lambda columns: True) == 5
+    assert not list(recorded.parent.iterdir())
+
+
+def test_what_was_set_aside_is_not_passed_over(recorded):
+    Layout(recorded).damaged.mkdir()
+    with pytest.raises(HandrailError, match=r"in \.damaged are episodes that were set aside"):
+        drop_episodes(recorded, odd)
+    assert len(read_episodes(recorded)) == 5
+
+
+def test_a_dataset_in_use_is_left_alone(recorded):
+    with resume(recorded, cameras=False), pytest.raises(HandrailError, match="is being written by another"):
+        drop_episodes(recorded, odd)
+    assert len(read_episodes(recorded)) == 5

@@ -10,6 +10,7 @@ from command_helpers import command
 from datasets_helpers import (
     CAMERAS,
     FPS,
+    check_is,
     create,
     files_of,
     frame_of,
@@ -23,7 +24,6 @@ from datasets_helpers import (
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.folder import quarantine
 from handrail.datasets.recording.repair import MOVED, REBUILT, REMOVED, repair
 
@@ -32,21 +32,6 @@ def _flip_a_byte(path, place=1 / 3):
     content = bytearray(path.read_bytes())
     content[int(len(content) * place)] ^= 0xFF
     path.write_bytes(content)
-
-
-def _check_is(root, originals):
-    """Check that the episodes are, in order, those that were recorded under these numbers."""
-    rows = read_episodes(root)
-    assert [row["seed"] for row in rows] == list(originals)
-    start = 0
-    for place, number in enumerate(originals):
-        assert (rows[place]["dataset_from_index"], rows[place]["length"]) == (start, length_of(number))
-        frames = read_frames(root, place)
-        expected = [frame_of(number, i, cameras=False)["action"] for i in range(length_of(number))]
-        assert np.array_equal(frames["action"], np.array(expected))
-        assert frames["index"].tolist() == list(range(start, start + length_of(number)))
-        assert set(frames["episode_index"]) == {place}
-        start += length_of(number)
 
 
 def test_a_whole_dataset_is_left_alone(root):
@@ -60,7 +45,9 @@ def test_a_whole_dataset_is_left_alone(root):
 
 
 @pytest.mark.parametrize("name", ["info", "stats", "tasks"])
-@pytest.mark.parametrize("content", [None, b"", b'{"total_episodes": 4, "feat', b"[1, 2]"])
+@pytest.mark.parametrize(
+    "content", [None, b"", b'{"total_episodes": 4, "feat', b"[1]", b'{"a": {"max": [NaN]}}']
+)
 def test_summary_files_are_rebuilt_to_the_byte(root, name, content):
     before, path = tree(root), getattr(Layout(root), name)
     path.unlink()
@@ -100,7 +87,7 @@ def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):
     assert tree(root) == before  # nothing that was saved is moved without being asked
     done = command(root, "--set_aside", name="edit repair")
     assert (done.returncode, done.stdout.count("\n")) == (1, 1)
-    _check_is(root, [0, 2, 3])
+    check_is(root, [0, 2, 3])
     assert not path.exists() or path.read_bytes() != before.get(path.relative_to(root).as_posix())
     assert repair(root).clean
     with resume(root, cameras=True) as writer:
@@ -134,7 +121,7 @@ def test_an_older_repair_that_was_cut_short_is_undone(tmp_path):
         assert [fault.split(":")[0] for fault in report.damage] == ["episode 1"]
         assert {name: content for name, content in tree(root).items() if name in before} == before
         assert repair(root, set_aside_damaged=True).episodes == 3
-        _check_is(root, [0, 2, 3])
+        check_is(root, [0, 2, 3])
 
 
 def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
@@ -168,7 +155,7 @@ def test_a_dataset_copied_in_part_is_named_as_such(root):
         resume(root, cameras=True)
     assert repair(root).episodes == 4
     assert repair(root, set_aside_damaged=True).episodes == 2
-    _check_is(root, [0, 1])
+    check_is(root, [0, 1])
 
 
 def test_a_stray_file_that_lerobot_would_read_is_set_aside(root):
@@ -205,4 +192,39 @@ def test_chunks_roll_over(tmp_path, monkeypatch):
     assert np.array_equal(dataset[len(dataset) - 1]["action"].numpy(), last)
     os.truncate(Layout(root).data(1), 10)
     repair(root, set_aside_damaged=True)
-    _check_is(root, [0, *range(2, 8)])
+    check_is(root, [0, *range(2, 8)])
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_lost_lines_of_metadata_never_cost_data(root, asked):
+    """If the lines of saved episodes vanish, their files are no leftovers of a crash."""
+    before = {content for path, content in tree(root).items() if path.startswith(("data", "videos"))}
+    shutil.rmtree(root / "meta" / "episodes")
+    Layout(root).info.unlink()
+    report = repair(root, asked)
+    assert report.episodes == (0 if asked else 4)
+    assert all("is missing" in fault for fault in report.damage or report.lost)
+    assert before <= set(tree(root / ".damaged" if asked else root).values())
+    assert not report.done[REMOVED]
+
+
+def test_a_dataset_of_which_only_the_count_is_left_may_begin_anew(root):
+    for name in ("data", "videos", "meta/episodes"):
+        shutil.rmtree(root / name)
+    assert len(repair(root).damage) == 4
+    assert repair(root, set_aside_damaged=True).episodes == 0
+    assert repair(root).clean
+
+
+@pytest.mark.parametrize("episodes", [1, 3])
+@pytest.mark.parametrize("info", [None, "{"])
+def test_the_last_line_and_the_count_gone_cost_no_data(tmp_path, episodes, info):
+    """A crash leaves `info.json` whole: without it, the files of the last episode are no leftovers."""
+    root = record(tmp_path / "set", episodes)
+    layout, rows = Layout(root), Layout(root).data(episodes - 1).read_bytes()
+    layout.row(episodes - 1).unlink()
+    layout.info.unlink() if info is None else layout.info.write_text(info)
+    with pytest.raises(HandrailError, match=f"episode {episodes - 1}: meta/.* is missing"):
+        resume(root)
+    assert not repair(root).done[REMOVED]
+    assert layout.data(episodes - 1).read_bytes() == rows

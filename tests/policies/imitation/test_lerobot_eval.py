@@ -105,11 +105,6 @@ def test_three_evaluations_move_the_robot_alike(recorded, rolled, tmp_path):
         rolled(folder)
 
 
-def test_both_evaluations_move_the_robot_alike(recorded, tmp_path):
-    folder = trained(recorded, tmp_path / "policy", "recorded")
-    np.testing.assert_array_equal(*both(folder, {}))
-
-
 def test_a_policy_of_intents_brings_what_completes_them(of_intents, rolled):
     """To what is left of numbers that LeRobot rounds to float32 on their way to the controller."""
     theirs, ours = both(of_intents, {"mode": "ee"})

@@ -80,16 +80,6 @@ def test_a_training_does_not_go_on_with_other_pictures(tmp_path, monkeypatch):
         read_source(moved, began)
 
 
-def test_a_policy_is_told_what_to_do(tmp_path):
-    """Few policies read it: ours say to their processors what LeRobot's rollouts say, too."""
-    root = canned(write_dataset, lengths=(5, 6))
-    policy = load_policy(train(tiny(root, tmp_path / "policy", steps=1), quiet=True))
-    told = []
-    listening = replace(policy, before=lambda batch: told.append(batch["task"]) or policy.before(batch))
-    listening.act(*still(policy), task="Move to the goal.")
-    assert told == [["Move to the goal."]]
-
-
 def keeping(batches, method):
     return lambda policy, batch: batches.append(batch) or method(policy, batch)
 

@@ -6,17 +6,13 @@ import json
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from training_helpers import CHANNELS, JOINTS, POSE
 
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.channels import Channels
-from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import decoded
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.interface import PolicyInterface
 
-CHANNELS = Channels.of(load_description("ridgeback_ur10"))
-JOINTS = [name.removeprefix("joint.") for name in CHANNELS.joints]
-POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 STATE = (
     *(f"{joint}.pos" for joint in JOINTS),
     *(f"{joint}.vel" for joint in JOINTS),

@@ -121,11 +121,6 @@ def test_what_was_not_seen_or_does_not_fit_is_said():
         PolicyViewStep(view.interface | {"actions": "none"})
 
 
-def test_nothing_is_added_where_the_policy_reads_what_is_recorded():
-    around = object(), object()
-    assert with_steps(*around, None) == around
-
-
 def test_a_checkpoint_of_intents_says_what_completes_them(checkpoint):
     actions, folder = checkpoint
     steps = json.loads((folder / "policy_postprocessor.json").read_text())["steps"]

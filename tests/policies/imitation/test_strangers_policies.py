@@ -8,10 +8,10 @@ import shutil
 import numpy as np
 import pytest
 from canned import copied
-from command_helpers import command
 from policy_helpers import untrained_act
 from safetensors.numpy import load_file, save_file
 from training_helpers import cut, tiny, write_dataset
+from training_helpers import refused as untrained
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -45,9 +45,8 @@ def add_step(file, **entry):
 def refused(folder, words):
     """The law: one line for the loader and for the evaluation, before anything is run."""
     for read in (load_policy, lambda place: evaluate(EvaluateConfig(policy=(str(place),)))):
-        with pytest.raises(HandrailError, match=words) as raised:
+        with pytest.raises(HandrailError, match=words):
             read(folder)
-        assert "\n" not in str(raised.value)
 
 
 class Touch:
@@ -157,10 +156,7 @@ def test_a_checkpoint_does_not_lead_out_of_the_training_s_folder(policy, tmp_pat
 def test_weights_are_safetensors(name, policy, tmp_path):
     (policy / "model.safetensors").unlink()
     (policy / name).write_bytes(pickle.dumps(Touch(tmp_path / "marker")))
-    with pytest.raises(HandrailError, match="stranger") as raised:
-        load_policy(policy)
-    assert "\n" not in str(raised.value)
-    assert command("--policy", policy, "--episodes", 1, name="evaluate").returncode == 2
+    refused(policy, "stranger")
     assert not (tmp_path / "marker").exists()
 
 
@@ -178,13 +174,6 @@ def test_settings_name_nothing_that_lies_elsewhere(place, policy, tmp_path, monk
     file.write_text(before)
     change(policy / "config.json", vision_backbone=name)
     refused(policy, "evil.*names .*elsewhere")
-
-
-def test_what_pytorch_says_at_length_is_cut(policy):
-    change(policy / "config.json", dim_model=64)
-    with pytest.raises(HandrailError, match=r"size mismatch .* …$") as raised:
-        load_policy(policy)
-    assert len(str(raised.value)) < 600
 
 
 @pytest.mark.parametrize("name", ["config.json", "handrail.json", *PROCESSORS])
@@ -230,14 +219,12 @@ def test_a_training_that_goes_on_runs_no_code_either(tmp_path):
     step = {"class": "os.mkdir", "config": {"path": str(tmp_path / "marker")}}
     add_step(folder / PROCESSORS[0], **step)
     resumed = tiny(tmp_path / "set", tmp_path / "policy", steps=6, resume=True)
-    with pytest.raises(HandrailError, match="expected a registered name, got the class"):
-        train(resumed, quiet=True)
+    untrained(resumed, "expected a registered name, got the class")
     assert not (tmp_path / "marker").exists()
     state = folder.parent / "training_state"
     shutil.move(state / "rng_state.safetensors", tmp_path / "outside")
     (state / "rng_state.safetensors").symlink_to(tmp_path / "outside")
-    with pytest.raises(HandrailError, match=r"rng_state.*found a link out of it"):
-        train(resumed, quiet=True)
+    untrained(resumed, "rng_state.*found a link out of it")
 
 
 def spoil(file, how):
@@ -266,8 +253,5 @@ def test_weights_and_statistics_are_the_policy_s_and_finite(file, how, trained, 
     (spoilt,) = place.glob(f"{file}.safetensors")
     assert load_policy(place).meta
     spoil(spoilt, how)
-    once = EvaluateConfig(policy=(str(place),), episodes=1, workers=1)
-    for use in (lambda: load_policy(place), lambda: evaluate(once), lambda: train(config, quiet=True)):
-        with pytest.raises(HandrailError, match=r"policy '.*training") as raised:
-            use()
-        assert "\n" not in str(raised.value)
+    refused(place, "policy '.*training")
+    untrained(config, "policy '.*training")

@@ -125,12 +125,6 @@ def test_what_a_policy_cannot_be_built_with_is_one_line(option, recorded, tmp_pa
     refused(config, "^policy act: ")
 
 
-def test_only_what_lerobot_refuses_is_put_into_its_mouth(recorded, tmp_path, monkeypatch):
-    monkeypatch.setattr("handrail.policies.imitation.training.memory.MemoryDataset.batch", _ours)
-    with pytest.raises(ValueError, match=r"^an error of ours$"):
-        train(tiny(recorded, tmp_path), quiet=True)
-
-
 @pytest.mark.parametrize("kind", ["FSDP", "DEEPSPEED"])
 def test_a_launch_that_splits_the_model_is_refused_in_one_line(kind, recorded, tmp_path, monkeypatch):
     """Law: accelerate's FSDP and DeepSpeed, whose parts a checkpoint does not gather, train nothing."""
@@ -140,10 +134,6 @@ def test_a_launch_that_splits_the_model_is_refused_in_one_line(kind, recorded, t
     monkeypatch.setattr(Accelerator, "distributed_type", DistributedType[kind])
     refused(tiny(recorded, tmp_path / "policy"), f"expected one process or --multi_gpu, got {kind}")
     assert not (tmp_path / "policy").exists()
-
-
-def _ours(self, indices):
-    raise ValueError("an error of ours")
 
 
 @pytest.mark.parametrize("resume", [False, True])

@@ -28,11 +28,7 @@ CASES = {
     "nothing but the action": (("action",), "act", "'observation.state' .* got no observation"),
     "pictures only": ((PICTURES, "action"), "act", "for policy act; got observation.images.top"),
     "pictures for another": ((PICTURES, "action"), "tdmpc", "or pictures and --images, for policy tdmpc"),
-    "state and pictures": (
-        (STATE, PICTURES, "action"),
-        "act",
-        "and --images, .*observation.images.top",
-    ),
+    "state and pictures": ((STATE, PICTURES, "action"), "act", "and --images, .*observation.images.top"),
     "no action": ((STATE, PICTURES), "act", "expected a column 'action', got observation.state"),
     "nothing but pictures": ((PICTURES,), "act", "expected a column 'action', got none"),
 }

@@ -6,13 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_study import DESIGN, FACTORS, MODES, SHARES
+from compare_helpers import check_texts
+from figure_helpers import shows
+from made_study import DESIGN, FACTORS, MODES, SHARES, TASK
 from scipy import stats
 
 from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.replicates import student, variance_of_share
 from handrail.policies.study import tables
 from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
+from handrail.policies.study.design import Flat, Robustness
+from handrail.policies.study.figures import figures
 from handrail.policies.study.power import detectable, plan, weights
 from handrail.policies.study.report import answer, cautions
 from handrail.policies.study.results import MEASURES
@@ -118,16 +122,6 @@ def test_what_is_planned_is_detected_in_four_of_five_studies(contrast):
     assert found / studies == pytest.approx(0.8, abs=0.06)
 
 
-def test_a_plan_says_what_can_be_detected_before_anything_is_there():
-    said = plan(DESIGN)
-    for name in FACTORS.primary:
-        assert f"{name} {100 * detectable(DESIGN, name):.0f}" in said
-    assert detectable(replace(DESIGN, draws=16), "input") < detectable(DESIGN, "input")
-    assert detectable(DESIGN, "interaction") == pytest.approx(2 * detectable(DESIGN, "input"))
-    assert "Nothing is declared" in plan(replace(DESIGN, factors=None))
-    assert "One draw tests nothing" in plan(replace(DESIGN, draws=1))
-
-
 def test_a_system_is_compared_with_the_best_policy_alone_and_named_so(gathered):
     results = gathered()
     found = [each for each in contrasts(results) if each.family == SYSTEM]
@@ -186,3 +180,54 @@ def test_a_share_of_few_is_never_certain():
     assert variance_of_share(0, 50, 50) > 0.0
     assert student([0.5], least=0.0).interval is None
     assert json.dumps(student([0.5, 0.7], least=0.0).estimate)
+
+
+def test_what_ended_before_its_loss_was_flat_is_told(gathered):
+    results = gathered()
+    assert any("before their loss was flat" in text for text, holds in cautions(results).items() if holds)
+    steady = gathered(replace(DESIGN, flat=Flat(every=5, patience=1, improvement=0.5)))
+    assert not any("before their loss was flat" in text for text, holds in cautions(steady).items() if holds)
+
+
+def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(gathered):
+    robust = replace(DESIGN, robustness=Robustness(("push",), ("filter",), rollouts=8, draws=2))
+    results = gathered(robust)
+    table = tables.treatments_table("reach", results)
+    assert {row[0] for row in table.rows} == {*MODES, "ee intent"}
+    for condition in results.of_task("reach", treated=True):
+        assert set(condition.draws) == {0, 1}
+        whole = results.find("reach", condition.label)
+        for draw, each in condition.draws.items():
+            assert set(each.rollouts) < set(whole.draws[draw].rollouts)
+
+
+def test_intents_without_the_mpc_and_velocities_through_it_stand_beside_what_they_were(gathered):
+    robust = replace(DESIGN, robustness=Robustness((), ("mpc", "none"), rollouts=8, draws=2))
+    results = gathered(robust)
+    treated = {(each.label, each.treatment) for each in results.of_task("reach", treated=True)}
+    assert treated == {*((mode, "mpc") for mode in MODES), ("ee intent", "unprotected")}
+    for row in tables.treatments_table("reach", results).rows:
+        whole = results.find("reach", row[0])
+        assert row[3] != "–"
+        assert row[-1] == "50 %"  # every other scene has contact, whatever the policy
+        assert set(whole.draws) >= {0, 1}
+
+
+def test_figures_show_what_was_found_and_no_text_covers_another(gathered):
+    names = ("reach", "tray", "pick_place")
+    design = replace(
+        DESIGN,
+        tasks=dict.fromkeys(names, TASK),
+        robustness=Robustness(("push", "shift", "delay"), rollouts=8),
+    )
+    results = gathered(design)
+    found = contrasts(results)
+    made = figures(results, found)
+    assert made.keys() == {"contrasts", "answer", "training", "robustness"}
+    assert shows(made["answer"], [100 * each.value.estimate for each in results.of_task("reach")])
+    declared = [100 * each.estimate for each in found if each.family == DECLARED]
+    assert shows(made["contrasts"], declared)
+    assert shows(made["training"], [0.4, 0.3])
+    assert not shows(made["answer"], 12.345)
+    for figure in made.values():
+        check_texts(figure)
