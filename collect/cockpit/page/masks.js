@@ -30,7 +30,7 @@ export class Masks {
     this.groups = Object.entries(GROUPS).map(([name, prefix]) => ({
       name, channels: stage.channels.flatMap((channel, index) => (channel.startsWith(prefix) ? [index] : [])),
     })).filter(({ channels }) => channels.length);
-    this.parts = this.groups.map(({ name, channels }) => toggle("", `you own the ${name}`, () => this.flip(channels)));
+    this.parts = this.groups.map(({ name, channels }) => toggle(`○ ${name}: robot`, `you own the ${name}`, () => this.flip(channels)));
     byId("owned").replaceChildren(...this.parts);
     this.single = stage.channels.map((name, index) => toggle(SHORT[name] ?? jointName(name), AXES[name]?.join(", ") ?? jointName(name), () => this.flip([index])));
     byId("channels").replaceChildren(...this.groups.map(({ name, channels }) => {
