@@ -146,7 +146,7 @@ def lerobot(folder: Path) -> dict:
     from lerobot.robots import make_robot_from_config
     from lerobot.robots.config import RobotConfig
 
-    import handrail.collect.lerobot  # noqa: F401
+    import handrail.collect.lerobot.plugins  # noqa: F401
 
     config = RobotConfig.get_choice_class("handrail_sim")(task="reach", realtime=False)
     robot = make_robot_from_config(config)

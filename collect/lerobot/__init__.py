@@ -1,33 +1,35 @@
 """LeRobot's plugins: its own commands drive the simulated robots, and people and scripts steer through them.
 
-`--robot.discover_packages_path=handrail.collect.lerobot` lets LeRobot find them: importing this registers
-
-    robot.type   handrail_sim
-    teleop.type  handrail_scripted, handrail_cockpit, handrail_gamepad
-    env.type     handrail
-    a step of processors: handrail_masked_mpc
+`--robot.discover_packages_path=handrail.collect.lerobot` lets LeRobot find what is in `plugins`. The names of
+`__all__` are imported from here; LeRobot, and with it torch, is loaded when one of them is used.
 """
 
-import handrail.collect.processor.mpc_step  # noqa: F401  (registers the step)
-from handrail.collect.lerobot.config_env import HandrailEnvConfig
-from handrail.collect.lerobot.configs import (
-    HandrailCockpitConfig,
-    HandrailGamepadConfig,
-    HandrailScriptedConfig,
-    HandrailSimConfig,
-)
-from handrail.collect.lerobot.person import HandrailCockpit, HandrailGamepad
-from handrail.collect.lerobot.scripted import HandrailScripted
-from handrail.collect.lerobot.sim import HandrailSim
+from typing import TYPE_CHECKING
 
-__all__ = [  # LeRobot looks for the classes here, by the names of their configs
-    "HandrailCockpit",
-    "HandrailCockpitConfig",
-    "HandrailEnvConfig",
-    "HandrailGamepad",
-    "HandrailGamepadConfig",
-    "HandrailScripted",
-    "HandrailScriptedConfig",
-    "HandrailSim",
-    "HandrailSimConfig",
-]
+from handrail.controllers.lazy import lazily
+
+if TYPE_CHECKING:
+    from handrail.collect.lerobot.config_env import HandrailEnvConfig as HandrailEnvConfig
+    from handrail.collect.lerobot.configs import HandrailCockpitConfig as HandrailCockpitConfig
+    from handrail.collect.lerobot.configs import HandrailGamepadConfig as HandrailGamepadConfig
+    from handrail.collect.lerobot.configs import HandrailScriptedConfig as HandrailScriptedConfig
+    from handrail.collect.lerobot.configs import HandrailSimConfig as HandrailSimConfig
+    from handrail.collect.lerobot.person import HandrailCockpit as HandrailCockpit
+    from handrail.collect.lerobot.person import HandrailGamepad as HandrailGamepad
+    from handrail.collect.lerobot.scripted import HandrailScripted as HandrailScripted
+    from handrail.collect.lerobot.sim import HandrailSim as HandrailSim
+
+_MODULES = {  # LeRobot looks for the classes here, by the names of their configs
+    "HandrailCockpit": "person",
+    "HandrailCockpitConfig": "configs",
+    "HandrailEnvConfig": "config_env",
+    "HandrailGamepad": "person",
+    "HandrailGamepadConfig": "configs",
+    "HandrailScripted": "scripted",
+    "HandrailScriptedConfig": "configs",
+    "HandrailSim": "sim",
+    "HandrailSimConfig": "configs",
+}
+
+__all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
+__getattr__ = lazily(__name__, _MODULES)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = ("handrail.controllers", "handrail.collect")
+PACKAGES = ("handrail.controllers", "handrail.collect", "handrail.collect.lerobot")
 HEAVY = ("casadi", "pinocchio", "coal", "numba", "mujoco", "lerobot", "torch", "rerun")
 
 

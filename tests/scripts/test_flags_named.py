@@ -15,7 +15,7 @@ from lerobot.teleoperators import TeleoperatorConfig
 from pages import CONFIGS, PAGES, text
 from places import FLOORS, ROOT, sources
 
-import handrail.collect.lerobot  # noqa: F401  (registers our plugins)
+import handrail.collect.lerobot.plugins  # noqa: F401
 
 FLAG = re.compile(r"(?<![\w(-])--[a-z][\w.]*(?:-[a-z]\w*)*")
 STYLE = ("var(--", 'style="')  # of a page: what begins with "--" there is a colour
