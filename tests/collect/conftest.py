@@ -8,6 +8,7 @@ try:
     from page_driver import CHROMIUM, browser
 except ImportError:  # Playwright comes with the extra 'dev'
     CHROMIUM, browser = (), None
+    collect_ignore_glob = ["*/test_page_*.py", "*/test_attacks.py"]
 
 
 @pytest.fixture(scope="session")

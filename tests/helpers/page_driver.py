@@ -13,6 +13,7 @@ CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-c
 _FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 _NUMBERS = " ".join([r"(-?\d+\.\d+)"] * 3)
 LOST = "no input: let go of everything"
+expect.set_options(timeout=60_000)  # a browser that draws in software may be slow
 SLOW = 180_000  # patience with a page: the controller may be compiled first [ms]
 
 
@@ -141,9 +142,9 @@ class PageDriver(Page):
         """Return where the hand is, and the turn from it to what the page says that it is to be like."""
         return self.place(), Rotation.from_rotvec(way(self.text("way"))[1][3:])
 
-    def settled(self, patience=2.0):
+    def settled(self):
         """Return where the hand is once it rests, as far as one sees."""
-        return self.at_rest(patience)[0]
+        return self.at_rest()[0]
 
     def at_rest(self, patience=2.0):
         """Return the hand once it rests."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
+from page_driver import PageDriver
 
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.reading.reader import read_episodes, read_info
@@ -61,6 +62,16 @@ def recording(folder, *flags, cwd=None):
             process.send_signal(signal.SIGTERM)
         with contextlib.suppress(ValueError):  # a test has read it all
             process.communicate(timeout=60)
+
+
+@contextlib.contextmanager
+def driven(new_page, folder, *flags):
+    """Run `handrail-cockpit` and begin an episode on its page; what is done there ends the recording well."""
+    with recording(folder, *flags) as (process, address):
+        driver = PageDriver(new_page(), address)
+        driver.begin()
+        yield driver
+        assert process.wait(90) == 0
 
 
 def saved(folder):

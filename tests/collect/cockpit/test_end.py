@@ -9,14 +9,6 @@ from cockpit_helpers import page, server, told
 from handrail.collect.cockpit.pipe import Kind
 
 
-def test_pages_hear_that_it_is_over_before_the_server_goes():
-    with server() as served, page(served) as socket:
-        told(socket, "you")
-        served.pipe.send_surely(Kind.OVER, {"saved": 2})
-        served.close()
-        assert told(socket, "over")["over"] == {"saved": 2}
-
-
 def test_a_server_that_lags_tells_it_too():
     with server() as served, page(served) as socket:
         told(socket, "you")

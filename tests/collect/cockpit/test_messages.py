@@ -68,7 +68,6 @@ def test_a_drive_and_an_ask():
 def test_anything_else_is_refused(text):
     with pytest.raises(HandrailError) as error:
         parse(text)
-    assert "\n" not in str(error.value)
     assert len(str(error.value)) < 300
 
 

@@ -39,23 +39,3 @@ def test_no_change_of_mode_jolts(env):
         before, fastest = v, max(fastest, float(np.abs(v).max()))
         env.plant.send(np.append(v, 0.0))
     assert fastest > 0.1
-
-
-def test_an_intent_without_a_mode_keeps_the_last(env):
-    built = []
-
-    class Fake:
-        def __init__(self, mode):
-            built.append(mode.controller)
-
-        def reset(self, obstacles=()):
-            pass
-
-        def update(self, state, intent):
-            return intent.mode
-
-    controller = ModeController(dict(MODES), Fake, MODES["direct"])
-    channels = Channels.of(env.model.description)
-    idle = Intent.idle(channels)
-    assert controller.update(env.state(), idle) == ""
-    assert built == ["direct"]

@@ -12,8 +12,6 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from cockpit_witness import Relay, Witness, closing, is_moving, is_still
 from page_driver import PageDriver
 from page_recording import Recording

@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from judges import doctor_fails, lint_defects
-from page_driver import PageDriver
-from page_recording import hand_columns, is_smooth, is_whole, recording, rows, saved
+from page_recording import driven, hand_columns, is_smooth, is_whole, rows, saved
 from playwright.sync_api import expect
 
 pytestmark = pytest.mark.slow
@@ -14,9 +11,7 @@ pytestmark = pytest.mark.slow
 
 def test_what_is_not_wanted_is_not_saved(new_page, tmp_path):
     """Thrown away: another scene. Again: the same one. Practice: as if it had not been."""
-    with recording(tmp_path / "d", "--task", "reach") as (process, address):
-        driver = PageDriver(new_page(), address)
-        driver.begin()
+    with driven(new_page, tmp_path / "d", "--task", "reach") as driver:
         first = driver.place("goal")
         driver.push("KeyW", 0.5)
         driver.press("Backspace")
@@ -38,15 +33,12 @@ def test_what_is_not_wanted_is_not_saved(new_page, tmp_path):
         assert driver.text("saved").startswith("0 saved")
         assert driver.at("episodes").locator("li").count() == 3
         driver.end()
-        assert process.wait(60) == 0
     assert saved(tmp_path / "d") == []
 
 
 def test_the_person_s_word_is_kept_beside_the_judge_s(new_page, tmp_path):
     """Where they differ the page says so first; what counts as a success is what the judge says."""
-    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 2) as (process, address):
-        driver = PageDriver(new_page(), address)
-        driver.begin()
+    with driven(new_page, tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 2) as driver:
         driver.push("KeyS", 0.6)
         driver.press("ArrowDown")
         driver.begin()
@@ -59,7 +51,6 @@ def test_the_person_s_word_is_kept_beside_the_judge_s(new_page, tmp_path):
         driver.press("Enter")
         driver.expect_phase("recording")
         driver.done()
-        assert process.wait(60) == 0
     assert [row["success"] for row in rows(tmp_path / "d")] == [False, False]
     assert [row["operator_says"] for row in rows(tmp_path / "d")] == ["failure", "success"]
     assert [row["failure_reason"] for row in rows(tmp_path / "d")] == ["operator: failure", "judge: not done"]
@@ -67,9 +58,7 @@ def test_the_person_s_word_is_kept_beside_the_judge_s(new_page, tmp_path):
 
 
 def test_esc_ends_nothing_and_the_end_of_a_recording_loses_nothing(new_page, tmp_path):
-    with recording(tmp_path / "d", "--task", "reach") as (process, address):
-        driver = PageDriver(new_page(), address)
-        driver.begin()
+    with driven(new_page, tmp_path / "d", "--task", "reach") as driver:
         driver.push("KeyS", 0.6)
         for _ in range(3):
             driver.press("Escape")
@@ -81,15 +70,12 @@ def test_esc_ends_nothing_and_the_end_of_a_recording_loses_nothing(new_page, tmp
         driver.expect_phase("recording")
         driver.push("KeyS", 0.4)
         driver.end(save="ArrowDown")
-        assert process.wait(60) == 0
     assert [row["operator_says"] for row in rows(tmp_path / "d")] == ["failure"]
 
 
 def test_undo_goes_back_to_the_pause(new_page, tmp_path):
     """What came after it never was, but for its mark; the path that is recorded has no gap."""
-    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as (process, address):
-        driver = PageDriver(new_page(), address)
-        driver.begin()
+    with driven(new_page, tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as driver:
         driver.push("KeyS", 0.8)
         driver.press("KeyP")
         driver.expect_phase("paused")
@@ -107,7 +93,6 @@ def test_undo_goes_back_to_the_pause(new_page, tmp_path):
         driver.expect_phase("recording")
         driver.push("KeyS", 0.5)
         driver.done()
-        assert process.wait(60) == 0
     (frames,) = saved(tmp_path / "d")
     assert [row["undos"] for row in rows(tmp_path / "d")] == [1]
     assert sorted(set(frames["teleop.undos"])) == [0, 1]
@@ -122,10 +107,8 @@ def test_the_mode_changes_in_motion_without_a_jolt(new_page, tmp_path):
     """Through every kind of controller, while keys stay held; nothing is let go of."""
     keys = ("KeyS", "KeyI", "Digit1")  # of the hand, the base, the arm
     modes = ("base+ee", "direct", "switching", "joints", "decoupled", "direct_cbf", "direct_filtered", "ee")
-    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as (process, address):
-        driver = PageDriver(new_page(), address)
+    with driven(new_page, tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as driver:
         driver.page.wait_for_timeout(3000)  # a browser that has just begun draws slowly
-        driver.begin()
         for key in keys:
             driver.page.keyboard.down(key)
         for mode in modes:
@@ -139,7 +122,6 @@ def test_the_mode_changes_in_motion_without_a_jolt(new_page, tmp_path):
         for key in keys:
             driver.page.keyboard.up(key)
         driver.press("ArrowDown")
-        assert process.wait(90) == 0
     (frames,) = saved(tmp_path / "d")
     said = frames["teleop.mode"]
     assert set(said) == {"ee", *modes}

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import page_tasks
 import pytest
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from page_driver import PageDriver
 from page_film import PageFilm
 from page_learner import Learner

@@ -5,12 +5,10 @@ import time
 
 import numpy as np
 import pytest
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from cockpit_helpers import heard, server, show
 from cockpit_witness import Relay, closing
 from page_driver import SLOW, PageDriver
-from page_recording import is_smooth, is_whole, recording, saved
+from page_recording import driven, is_smooth, is_whole, recording, saved
 from playwright.sync_api import expect
 
 from handrail.collect.cockpit.pipe import Kind
@@ -19,9 +17,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_a_reload_in_the_middle_loses_nothing(new_page, tmp_path):
-    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as (process, address):
-        driver = PageDriver(new_page(), address)
-        driver.begin()
+    with driven(new_page, tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as driver:
         start = driver.place()
         driver.push("KeyS", 1.0)
         driver.page.keyboard.down("KeyS")
@@ -40,7 +36,6 @@ def test_a_reload_in_the_middle_loses_nothing(new_page, tmp_path):
         driver.push("KeyS", 0.8)
         assert np.abs(driver.settled() - before).max() > 0.03
         driver.done()
-        assert process.wait(60) == 0
     (frames,) = saved(tmp_path / "d")
     assert is_whole(frames)
     assert is_smooth(frames)

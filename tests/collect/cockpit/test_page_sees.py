@@ -5,18 +5,13 @@ import re
 
 import numpy as np
 import pytest
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
-from cockpit_bench import bench
 from page_driver import PageDriver
-from page_levers import Keys
 from page_shots import shoot
 from page_words import way
 from playwright.sync_api import expect
 from scipy.spatial.transform import Rotation
 
 pytestmark = pytest.mark.slow
-expect.set_options(timeout=60_000)  # a browser that draws in software may be slow
 SIZES = [(1280, 720), (1920, 1080), (844, 390)]
 _FREE = """async () => {
   const { free } = await import("./tools.js"), area = free(document.getElementById("view-tools"));
@@ -47,127 +42,85 @@ _FRAMED = """async ([width, height, points]) => {
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
-def test_hand_and_goal_are_in_the_area_that_panels_leave_free(new_page, width, height):
-    with bench() as made:
-        phone = {"has_touch": True, "is_mobile": True} if height < 480 else {}
-        driver = PageDriver(new_page(viewport={"width": width, "height": height}, **phone), made.address)
-        driver.expect_phase("ready: press Start")
-        for _ in range(2):
-            area = driver.page.evaluate(_FREE)
-            assert set(area.pop("hit")) <= {"view", "nearest-label"}
-            assert area["width"] > 0.4 * width
-            assert area["height"] > 0.25 * height
-            rng = np.random.default_rng(0)
-            points = rng.uniform([-2, -2, 0.1], [2, 2, 1.4], (50, 2, 3)).tolist()
-            seen = np.array(driver.page.evaluate(_FRAMED, [width, height, points]))
-            inside = (seen - [area["x"], area["y"]]) / [area["width"], area["height"]]
-            assert np.all((inside > 0.0) & (inside < 1.0))
-            if driver.at("hint").is_visible():
-                driver.at("hint-close").click()
-            for name in ("choices-open", "episodes-open"):  # away; on a phone they are away already
-                if driver.at(name).get_attribute("aria-expanded") == "true":
-                    driver.at(name).click()
+def test_hand_and_goal_are_in_the_area_that_panels_leave_free(on_bench, width, height):
+    phone = {"has_touch": True, "is_mobile": True} if height < 480 else {}
+    _, driver = on_bench(viewport={"width": width, "height": height}, **phone)
+    driver.expect_phase("ready: press Start")
+    for _ in range(2):
+        area = driver.page.evaluate(_FREE)
+        assert set(area.pop("hit")) <= {"view", "nearest-label"}
+        assert area["width"] > 0.4 * width
+        assert area["height"] > 0.25 * height
+        rng = np.random.default_rng(0)
+        points = rng.uniform([-2, -2, 0.1], [2, 2, 1.4], (50, 2, 3)).tolist()
+        seen = np.array(driver.page.evaluate(_FRAMED, [width, height, points]))
+        inside = (seen - [area["x"], area["y"]]) / [area["width"], area["height"]]
+        assert np.all((inside > 0.0) & (inside < 1.0))
+        if driver.at("hint").is_visible():
+            driver.at("hint-close").click()
+        for name in ("choices-open", "episodes-open"):  # away; on a phone they are away already
+            if driver.at(name).get_attribute("aria-expanded") == "true":
+                driver.at(name).click()
 
 
-def test_the_page_says_how_far_the_hand_is_and_how_much_turned(new_page):
-    with bench() as made:
-        driver = PageDriver(new_page(), made.address)
-        driver.choose("frame", "world")
-        state = made.view().task
-        left = state.goal.position - state.tool.position
-        assert driver.wait(lambda: np.abs(way(driver.text("way"))[1][:3] - left).max() < 0.006)
-        said = driver.text("way")
-        _, error = way(said)
-        turn = np.degrees(Rotation.from_matrix(state.goal.rotation @ state.tool.rotation.T).as_rotvec())
-        assert np.abs(np.degrees(error[3:]) - turn).max() < 0.6
-        distance, degrees = re.search(r"([\d.]+) cm away.* turned (\d+)°", said).groups()
-        assert float(distance) == pytest.approx(100 * np.linalg.norm(left), abs=0.6)
-        assert float(degrees) == pytest.approx(np.linalg.norm(turn), abs=0.6)
-        words = driver.page.inner_text("body")
-        assert not re.search(r"[-−]0(\.0)? cm|NaN|undefined|null", words)
-        assert re.search(r"nearest pair: .+ – .+, [\d.]+ cm apart", words)
-        assert not re.search(r"-?\d\.\d{3} -?\d\.\d{3}", words)  # numbers are folded away
+def test_the_page_says_how_far_the_hand_is_and_how_much_turned(on_bench):
+    made, driver = on_bench()
+    driver.choose("frame", "world")
+    state = made.view().task
+    left = state.goal.position - state.tool.position
+    assert driver.wait(lambda: np.abs(way(driver.text("way"))[1][:3] - left).max() < 0.006)
+    said = driver.text("way")
+    _, error = way(said)
+    turn = np.degrees(Rotation.from_matrix(state.goal.rotation @ state.tool.rotation.T).as_rotvec())
+    assert np.abs(np.degrees(error[3:]) - turn).max() < 0.6
+    distance, degrees = re.search(r"([\d.]+) cm away.* turned (\d+)°", said).groups()
+    assert float(distance) == pytest.approx(100 * np.linalg.norm(left), abs=0.6)
+    assert float(degrees) == pytest.approx(np.linalg.norm(turn), abs=0.6)
+    words = driver.page.inner_text("body")
+    assert not re.search(r"[-−]0(\.0)? cm|NaN|undefined|null", words)
+    assert re.search(r"nearest pair: .+ – .+, [\d.]+ cm apart", words)
+    assert not re.search(r"-?\d\.\d{3} -?\d\.\d{3}", words)  # numbers are folded away
 
 
-@pytest.mark.parametrize("task", ["Reach", "PickPlace"])
-def test_the_first_hint_names_every_key_that_the_task_needs(new_page, task):
-    with bench(task=task) as made:
-        driver = PageDriver(new_page(), made.address)
-        driver.expect_phase("ready: press Start")
-        hint = driver.text("hint-words")
-        for key in [key.removeprefix("Key") for pair in Keys(driver).pairs for key in pair] + [
-            "Enter",
-            "Space",
-        ]:
-            assert re.search(rf"\b{key}\b", hint), (key, hint)
-        assert ("left Shift" in hint and "gripper" in hint) == (task == "PickPlace")
+def test_an_upright_phone_is_to_be_turned_and_nothing_is_cut(on_bench):
+    _, driver = on_bench(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    page = driver.page
+    expect(driver.at("turn-phone")).to_contain_text("Turn your phone")
+    shoot(page, "upright")
+    for name in ("turn-phone", "stop"):
+        expect(driver.at(name)).to_be_in_viewport(ratio=1.0)
+    hit = "(y) => document.elementFromPoint(195, y)?.id"
+    assert {page.evaluate(hit, y) for y in range(5, 760, 15)} == {"turn-phone"}
+    driver.at("stop").tap()
+    driver.expect_phase("STOPPED")
+    page.set_viewport_size({"width": 844, "height": 390})
+    expect(driver.at("turn-phone")).to_be_hidden()
+    expect(driver.at("start")).to_be_in_viewport(ratio=1.0)
 
 
-def test_what_experts_need_is_folded_away(new_page):
-    with bench() as made:
-        driver = PageDriver(new_page(), made.address)
-        inside = ("one-joint", "channels", "locks", "numbers")
-        assert all(driver.at(name).is_hidden() for name in inside)
-        driver.page.get_by_text("More").click()
-        expect(driver.at("one-joint")).to_be_visible()
-
-
-def test_who_watches_is_told_so(new_page):
-    with bench() as made:
-        first, second = (PageDriver(new_page(), made.address) for _ in range(2))
-        second.expect_phase("you watch: not begun")
-        expect(second.at("drives")).to_contain_text("You watch")
-        for name in ("hint", "start", "success", "quit"):
-            assert second.at(name).is_hidden()
-        first.begin()
-        second.expect_phase("you watch: recording")
-        shoot(second.page, "watching")
-        second.press("Space")
-        expect(second.at("banner")).to_contain_text("Only the driver can release it")
-        first.expect_phase("STOPPED")
-
-
-def test_an_upright_phone_is_to_be_turned_and_nothing_is_cut(new_page):
-    with bench() as made:
-        page = new_page(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
-        driver = PageDriver(page, made.address)
-        expect(driver.at("turn-phone")).to_contain_text("Turn your phone")
-        shoot(page, "upright")
-        for name in ("turn-phone", "stop"):
-            expect(driver.at(name)).to_be_in_viewport(ratio=1.0)
-        hit = "(y) => document.elementFromPoint(195, y)?.id"
-        assert {page.evaluate(hit, y) for y in range(5, 760, 15)} == {"turn-phone"}
-        driver.at("stop").tap()
-        driver.expect_phase("STOPPED")
-        page.set_viewport_size({"width": 844, "height": 390})
-        expect(driver.at("turn-phone")).to_be_hidden()
-        expect(driver.at("start")).to_be_in_viewport(ratio=1.0)
-
-
-def test_esc_closes_what_is_open_and_never_becomes_a_key(new_page):
+def test_esc_closes_what_is_open_and_never_becomes_a_key(on_bench):
     old = json.dumps("Escape")
-    with bench() as made:
-        driver = PageDriver(new_page(), made.address)
-        page = driver.page
-        for button, asked in (("hand forward: W", "W"), ("end the recording: End", "End")):
-            driver.press("KeyH")
-            page.get_by_role("button", name=button).click()
-            driver.press("Escape")  # it stays as it was
-            expect(page.get_by_role("button", name=button)).to_have_text(asked)
-            driver.press("Escape")
-            expect(driver.at("help")).to_be_hidden()
+    made, driver = on_bench()
+    page = driver.page
+    for button, asked in (("hand forward: W", "W"), ("end the recording: End", "End")):
         driver.press("KeyH")
-        page.get_by_role("button", name="hand forward: W").click()
-        driver.press("KeyY")
-        driver.press("KeyH")
-        name = f"handrail:map:{made.robot}"
-        page.evaluate(
-            f"""(name) => localStorage.setItem(name, localStorage.getItem(name).replace('"End"', '{old}'))""",
-            name,
-        )
-        page.reload()  # an older page's keys: the person's own stay, Esc goes
-        driver = PageDriver(page)
-        expect(driver.at("quit")).to_contain_text("End recording End")
-        driver.press("KeyH")
-        expect(page.get_by_role("button", name="hand forward: Y")).to_be_visible()
-        driver.press("KeyH")
+        page.get_by_role("button", name=button).click()
+        driver.press("Escape")  # it stays as it was
+        expect(page.get_by_role("button", name=button)).to_have_text(asked)
+        driver.press("Escape")
+        expect(driver.at("help")).to_be_hidden()
+    driver.press("KeyH")
+    page.get_by_role("button", name="hand forward: W").click()
+    driver.press("KeyY")
+    driver.press("KeyH")
+    name = f"handrail:map:{made.robot}"
+    page.evaluate(
+        f"""(name) => localStorage.setItem(name, localStorage.getItem(name).replace('"End"', '{old}'))""",
+        name,
+    )
+    page.reload()  # an older page's keys: the person's own stay, Esc goes
+    driver = PageDriver(page)
+    expect(driver.at("quit")).to_contain_text("End recording End")
+    driver.press("KeyH")
+    expect(page.get_by_role("button", name="hand forward: Y")).to_be_visible()
+    driver.press("KeyH")

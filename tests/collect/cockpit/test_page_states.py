@@ -1,16 +1,11 @@
 """Laws of what the page says: each state has its words and look; `HANDRAIL_SHOTS` keeps pictures."""
 
 import pytest
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
-from cockpit_bench import bench
-from cockpit_helpers import server
-from page_driver import LOST, PageDriver
+from page_driver import LOST
 from page_shots import shoot
 from playwright.sync_api import expect
 
 pytestmark = pytest.mark.slow
-expect.set_options(timeout=60_000)  # a browser that draws in software may be slow
 SIZES = {
     "1280": {"viewport": {"width": 1280, "height": 720}},
     "1920-dark": {"viewport": {"width": 1920, "height": 1080}, "color_scheme": "dark"},
@@ -24,115 +19,81 @@ window.WebSocket = class extends WebSocket {
 """
 
 
-def test_getting_ready_until_there_is_something_to_draw(new_page):
-    with server() as served:
-        page = new_page()
-        page.goto(served.address)
-        expect(page.locator("#phase")).to_have_text("getting ready …")
-        expect(page.locator("#banner")).to_contain_text("compiled")
-        assert page.locator("#start").is_disabled()
-        shoot(page, "getting-ready")
-
-
 @pytest.mark.parametrize("size", SIZES)
-def test_states_of_driving(new_page, size):
-    with bench() as made:
-        driver = PageDriver(new_page(**SIZES[size]), made.address)
-        page = driver.page
-        driver.expect_phase("ready: press Start")
-        assert "seen" not in page.evaluate("JSON.stringify(localStorage)")
-        shoot(page, f"ready-{size}")
-        page.locator("#hint-close").click()
-        assert page.locator("#hint").is_hidden()
-        for name in ("start", "pause", "undo", "success", "failure", "stop"):
-            expect(driver.at(name)).to_be_in_viewport(ratio=1.0)
-        assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
-        driver.press("KeyH")
-        shoot(page, f"help-{size}")
-        driver.press("KeyH")
-        driver.begin()
-        page.keyboard.down("KeyW")
-        made.wait(lambda intent: intent.raw.axes == 1)
-        shoot(page, f"driving-{size}")
-        page.evaluate("dispatchEvent(new Event('blur'))")
-        driver.expect_phase(LOST)
-        expect(driver.at("banner")).to_contain_text("Let go of everything")
-        shoot(page, f"lost-{size}")
-        page.keyboard.up("KeyW")
-        page.evaluate("dispatchEvent(new Event('focus'))")
-        driver.expect_phase("recording")
-        driver.press("KeyP")
-        driver.expect_phase("paused")
-        shoot(page, f"paused-{size}")
-        driver.press("Space")
-        driver.expect_phase("STOPPED")
-        expect(driver.at("start")).to_contain_text("Release")
-        shoot(page, f"stopped-{size}")
+def test_states_of_driving(on_bench, size):
+    made, driver = on_bench(**SIZES[size])
+    page = driver.page
+    driver.expect_phase("ready: press Start")
+    assert "seen" not in page.evaluate("JSON.stringify(localStorage)")
+    shoot(page, f"ready-{size}")
+    page.locator("#hint-close").click()
+    assert page.locator("#hint").is_hidden()
+    for name in ("start", "pause", "undo", "success", "failure", "stop"):
+        expect(driver.at(name)).to_be_in_viewport(ratio=1.0)
+    assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+    driver.press("KeyH")
+    shoot(page, f"help-{size}")
+    driver.press("KeyH")
+    driver.begin()
+    page.keyboard.down("KeyW")
+    made.wait(lambda intent: intent.raw.axes == 1)
+    shoot(page, f"driving-{size}")
+    page.evaluate("dispatchEvent(new Event('blur'))")
+    driver.expect_phase(LOST)
+    expect(driver.at("banner")).to_contain_text("Let go of everything")
+    shoot(page, f"lost-{size}")
+    page.keyboard.up("KeyW")
+    page.evaluate("dispatchEvent(new Event('focus'))")
+    driver.expect_phase("recording")
+    driver.press("KeyP")
+    driver.expect_phase("paused")
+    shoot(page, f"paused-{size}")
+    driver.press("Space")
+    driver.expect_phase("STOPPED")
+    expect(driver.at("start")).to_contain_text("Release")
+    shoot(page, f"stopped-{size}")
 
 
-def test_practice_errors_and_the_end(new_page):
-    with bench() as made:
-        driver = PageDriver(new_page(**SIZES["1280"]), made.address)
-        driver.at("practice").check()
-        driver.begin("practice: not recorded")
-        shoot(driver.page, "practice")
-        driver.press("Space")
-        driver.expect_phase("STOPPED")
-        driver.press("Enter")
-        driver.expect_phase("paused")
-        made.end()
-        driver.expect_phase("ready: press Start")
-        expect(driver.at("episodes").locator("li")).to_contain_text("success")
-        shoot(driver.page, "recorded")
-        made.close()
-        expect(driver.at("phase")).to_have_text("no connection: recording is over")
-        expect(driver.at("banner")).to_contain_text("Recording is over: ")
-        shoot(driver.page, "over")
+def test_a_refused_message_is_said_on_the_page_and_a_cut_is_seen(on_bench):
+    _, driver = on_bench(script=SOCKET)
+    page = driver.page
+    page.evaluate("socket.send('garbage')")
+    expect(driver.at("notice")).to_contain_text("expected JSON")
+    shoot(page, "error")
+    page.evaluate("() => { window.WebSocket = class { static OPEN = 1; readyState = 0; close() {} }; }")
+    page.evaluate("socket.close()")
+    driver.expect_phase("no connection")
+    shoot(page, "reconnecting")
 
 
-def test_a_refused_message_is_said_on_the_page_and_a_cut_is_seen(new_page):
-    with bench() as made:
-        page = new_page(script=SOCKET)
-        driver = PageDriver(page, made.address)
-        page.evaluate("socket.send('garbage')")
-        expect(driver.at("notice")).to_contain_text("expected JSON")
-        shoot(page, "error")
-        page.evaluate("() => { window.WebSocket = class { static OPEN = 1; readyState = 0; close() {} }; }")
-        page.evaluate("socket.close()")
-        driver.expect_phase("no connection")
-        shoot(page, "reconnecting")
+def test_a_countdown_starts_the_episode_and_any_action_ends_it(on_bench):
+    _, driver = on_bench()
+    driver.at("countdown-wanted").check()
+    driver.press("Enter")
+    expect(driver.at("countdown")).to_be_visible()
+    shoot(driver.page, "countdown")
+    driver.press("Space")
+    assert driver.at("countdown").is_hidden()
+    driver.expect_phase("STOPPED")
+    driver.press("Enter")
+    driver.expect_phase("paused")
 
 
-def test_a_countdown_starts_the_episode_and_any_action_ends_it(new_page):
-    with bench() as made:
-        driver = PageDriver(new_page(), made.address)
-        driver.at("countdown-wanted").check()
-        driver.press("Enter")
-        expect(driver.at("countdown")).to_be_visible()
-        shoot(driver.page, "countdown")
-        driver.press("Space")
-        assert driver.at("countdown").is_hidden()
-        driver.expect_phase("STOPPED")
-        driver.press("Enter")
-        driver.expect_phase("paused")
-
-
-def test_whatever_the_browser_remembers_the_page_works(new_page):
+def test_whatever_the_browser_remembers_the_page_works(on_bench):
     """Text that is no JSON, another kind of value, an older page's keys, keys without a stop."""
-    with bench() as made:
-        driver = PageDriver(new_page(), made.address)
-        names = ["handrail:hint", "handrail:countdown", "handrail:sticks", f"handrail:map:{made.robot}"]
-        for kept in ("{", "[]", '{"keys": 3, "actions": {"stop": "KeyX"}}', '[["KeyW", "no.such", 1]]'):
-            script = "([names, kept]) => names.forEach((name) => localStorage.setItem(name, kept))"
-            driver.page.evaluate(script, [names, kept])
-            driver.page.reload()
-            expect(driver.at("numbers")).not_to_be_empty()
-            made.begin(made.seed + 1)
-            driver.begin()
-            driver.page.keyboard.down("KeyW")
-            made.wait(lambda intent: intent.raw.axes == 1)
-            driver.page.keyboard.up("KeyW")
-            driver.press("Space")
-            driver.expect_phase("STOPPED")
-            driver.press("Enter")
-            driver.expect_phase("paused")
+    made, driver = on_bench()
+    names = ["handrail:hint", "handrail:countdown", "handrail:sticks", f"handrail:map:{made.robot}"]
+    for kept in ("{", "[]", '{"keys": 3, "actions": {"stop": "KeyX"}}', '[["KeyW", "no.such", 1]]'):
+        script = "([names, kept]) => names.forEach((name) => localStorage.setItem(name, kept))"
+        driver.page.evaluate(script, [names, kept])
+        driver.page.reload()
+        expect(driver.at("numbers")).not_to_be_empty()
+        made.begin(made.seed + 1)
+        driver.begin()
+        driver.page.keyboard.down("KeyW")
+        made.wait(lambda intent: intent.raw.axes == 1)
+        driver.page.keyboard.up("KeyW")
+        driver.press("Space")
+        driver.expect_phase("STOPPED")
+        driver.press("Enter")
+        driver.expect_phase("paused")

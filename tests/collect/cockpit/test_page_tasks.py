@@ -10,8 +10,6 @@ import numpy as np
 import page_tasks
 import pytest
 from command_helpers import command
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from page_driver import PageDriver
 from page_learner import Learner
 from page_levers import Keys, Pad
@@ -21,9 +19,9 @@ pytestmark = pytest.mark.slow
 PATIENT = ("--time_limit", "180")  # who tries what each key does takes longer, on a busy computer above all
 
 
-def drive(new_page, folder, task, device, episodes, mode="ee", *flags):
+def drive(new_page, folder, task, device, episodes, mode):
     """Do a task some times, as somebody who sees the page for the first time."""
-    flags = ("--task", task, "--mode", mode, "--dataset.num_episodes", episodes, *flags)
+    flags = ("--task", task, "--mode", mode, "--dataset.num_episodes", episodes, *PATIENT)
     with recording(folder, *flags) as (process, address):
         driver = PageDriver(new_page(device.SCRIPT), address)
         driver.begin()
@@ -59,41 +57,32 @@ def reached(tmp_path_factory):
 
 
 def test_reach_by_keys(new_page, reached):
-    """Who holds the keys for what the page says is left gets there; nothing has to be tried or measured."""
+    """Who holds the keys for what the page says is left gets there, whatever the hand goes along."""
     with recording(reached, "--task", "reach", "--dataset.num_episodes", 5) as (process, address):
         driver = PageDriver(new_page(), address)
-        for _ in range(5):
+        for frame in ("", "", "world", "base", "tool"):
             driver.begin()
+            if frame:
+                driver.choose("frame", frame)
             page_tasks.follow_words(driver)
         assert process.wait(60) == 0
     check(reached, 5, "keyboard")
 
 
-@pytest.mark.parametrize("frame", ["world", "base", "tool"])
-def test_the_words_hold_whatever_the_hand_goes_along(new_page, tmp_path, frame):
-    with recording(tmp_path / "reach", "--task", "reach", "--dataset.num_episodes", 1) as (process, address):
-        driver = PageDriver(new_page(), address)
-        driver.begin()
-        driver.choose("frame", frame)
-        page_tasks.follow_words(driver)
-        assert process.wait(60) == 0
-    check(tmp_path / "reach", 1, "keyboard")
-
-
-def test_pick_place_by_keys(new_page, tmp_path):
-    drive(new_page, tmp_path / "pick", "pick_place", Keys, 5, "ee", *PATIENT)
-    check(tmp_path / "pick", 5, "keyboard", fewest=4)
-
-
-def test_pick_place_by_sticks(new_page, tmp_path):
-    drive(new_page, tmp_path / "pick", "pick_place", Pad, 3, "ee", *PATIENT)
-    check(tmp_path / "pick", 3, "gamepad")
-
-
-def test_reach_by_the_keys_of_every_joint(new_page, tmp_path):
+@pytest.mark.parametrize(
+    ("task", "levers", "device", "mode", "episodes", "fewest"),
+    [
+        ("pick_place", Keys, "keyboard", "ee", 5, 4),
+        ("pick_place", Pad, "gamepad", "ee", 3, 3),
+        ("reach", Keys, "keyboard", "direct", 1, 1),
+    ],
+)
+def test_who_tries_what_each_lever_does_does_the_task(
+    new_page, tmp_path, task, levers, device, mode, episodes, fewest
+):
     """Nobody is told what a joint's key does to the hand; they find out, within a longer time."""
-    drive(new_page, tmp_path / "reach", "reach", Keys, 1, "direct", *PATIENT)
-    check(tmp_path / "reach", 1, "keyboard", "direct")
+    drive(new_page, tmp_path / "d", task, levers, episodes, mode)
+    check(tmp_path / "d", episodes, device, mode, fewest)
 
 
 def test_what_was_driven_is_a_dataset_like_any_other(reached, tmp_path):

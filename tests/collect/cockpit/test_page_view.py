@@ -4,8 +4,6 @@ import json
 import signal
 
 import pytest
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from page_driver import PageDriver
 from page_recording import recording
 from playwright.sync_api import expect

@@ -7,11 +7,9 @@ from contextlib import contextmanager
 
 import pytest
 from command_helpers import command
-from user_study_helpers import study_folder
-
-pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from participant_driver import REMARK, ParticipantDriver
 from playwright.sync_api import expect
+from user_study_helpers import study_folder
 
 from handrail.collect.user_study.design import DEMO_NOTE
 from handrail.collect.user_study.questionnaires import PAIRS, sus_score, tlx_raw, tlx_weighted
