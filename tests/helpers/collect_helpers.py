@@ -1,7 +1,7 @@
 """Shared by the tests of collect/: environments that are closed, poses that are reached, a second robot."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,18 @@ from places import ROOT
 from scipy.spatial.transform import Rotation
 
 import handrail.collect  # noqa: F401  (registers the environments)
-from handrail.collect.session.build import session_features
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.operator import View
+from handrail.collect.session.build import build_env, build_session, session_features
+from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorder import Recorder
+from handrail.collect.session.session import Observer
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene, SceneObject
 from handrail.collect.world.task import Start
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.frames import Frame
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -34,6 +40,24 @@ class Watcher:
 
     def see(self, frame: Frame) -> None:
         self.frames.append(frame)
+
+
+class Motionless:
+    """An operator who asks for nothing, and notes what they see."""
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        self.seen: list[View] = []
+
+    def act(self, view: View) -> Intent:
+        self.seen.append(view)
+        return Intent.idle(Channels.of(load_model().description), time=view.state.time)
+
+
+def episode(seed: int, *observers: Observer, **settings: Any) -> Outcome:
+    """Run one episode of a session with some settings; return how it went."""
+    config = SessionConfig(**settings)
+    with closing(build_env(config, 20)) as env:
+        return build_session(config, env, observers).run(seed)
 
 
 @contextmanager
@@ -57,6 +81,16 @@ def recording(root: Path, env: HandrailEnv) -> Iterator[Recorder]:
 
 def action(env: HandrailEnv, velocity: Any = 0.0, gripper: float = 0.0) -> np.ndarray:
     return np.append(np.zeros(env.model.size) + velocity, gripper).astype(np.float32)
+
+
+def hold(env: HandrailEnv, steps: int, gripper: float = 0.0, velocity: Any = 0.0) -> dict:
+    """Ask for the same again and again until the episode is over; return what was said last."""
+    info = {}
+    for _ in range(steps):
+        *_, terminated, _, info = env.step(action(env, velocity, gripper))
+        if terminated:
+            break
+    return info
 
 
 def reach(model: RobotModel, q: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:

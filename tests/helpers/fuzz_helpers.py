@@ -4,7 +4,6 @@ The robot is MuJoCo's, and its gate stands open: what the controller says is wha
 Contacts and distances are MuJoCo's too.
 """
 
-import itertools
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,8 +11,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.collect.world.gl import mujoco
-from handrail.collect.world.gripper import FINGERS
 from handrail.collect.world.plant import Gate
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.world.simulation import Simulation
@@ -40,7 +37,6 @@ class FuzzResult:
     own: list[str] = field(default_factory=list)  # contacts with itself
     standing: list[str] = field(default_factory=list)  # with what stands still
     moving: list[str] = field(default_factory=list)  # with movers, which end the run: nothing stops them
-    nearest_own: float = np.inf  # smallest distance of the robot to itself, at the ends of periods [m]
     statuses: Counter[str] = field(default_factory=Counter)
     velocity_excess: float = 0.0  # over the limit, relative
     acceleration_excess: float = 0.0  # between consecutive commands, over the limit, relative
@@ -155,25 +151,6 @@ def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
     controller.solver.solve = honest
 
 
-class OwnDistances:
-    """MuJoCo's distances between the robot's own geoms, those pairs that it may touch itself with."""
-
-    def __init__(self, model, compiled):
-        self._model, gripper = compiled, model.description.end_effector.gripper
-        geoms = {shape.name: (shape.name,) for shape in model.description.collision}
-        geoms[gripper.shape] = FINGERS  # stand in for the shape around them
-        self._pairs = [
-            (compiled.geom(first).id, compiled.geom(second).id)
-            for pair in model.description.self_pairs
-            for first, second in itertools.product(*(geoms[name] for name in pair))
-        ]
-
-    def smallest(self, data):
-        where = np.zeros(6)
-        near = [mujoco.mj_geomDistance(self._model, data, a, b, 0.5, where) for a, b in self._pairs]
-        return min(near, default=np.inf)
-
-
 def run(
     model: RobotModel, controller, seed: int, seconds: float, movers: int = 0, gap: float = PERIOD
 ) -> FuzzResult:
@@ -190,7 +167,6 @@ def run(
     rng = np.random.default_rng([seed, movers])
     scene, q = cluttered(model, movers, rng)
     simulation = Simulation(model, scene, q, PERIOD, gate=OpenGate(model, PERIOD))
-    own = OwnDistances(model, simulation.mujoco_model)
     controller.reset(scene.obstacles(0.0))
     limits, result = model.description.limits, FuzzResult()
     rude = RudeOperator(controller.channels, limits, rng)
@@ -217,6 +193,5 @@ def run(
             kind.append(f"{pair} at {state.time:.2f} s, {command.diagnostics.status}")
         if result.moving:
             break
-        result.nearest_own = min(result.nearest_own, own.smallest(simulation.data))
         result.travelled += float(np.linalg.norm(simulation.tool.position - hand))
     return result

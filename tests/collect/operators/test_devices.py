@@ -11,10 +11,9 @@ from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.input_map import StickMap
 from handrail.collect.operators.scripted.reach import ReachScript
-from handrail.collect.operators.scripted.scripted import DEVICES, gains_of, scripted_operator
+from handrail.collect.operators.scripted.scripted import DEVICES, gains_of
 from handrail.collect.operators.scripted.single_axis import clear_order, sweep_clearance
 from handrail.collect.operators.scripted.steering import Gains, MotionGoal
-from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.split_controller import split_controller
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
@@ -137,13 +136,3 @@ def test_joints_are_moved_in_an_order_that_hits_nothing():
     assert clear_order(CollisionModel(MODEL), HOME, goal, [4, 5], clear) == [4, 5]
     everywhere = Obstacle("wall", table.shape, MODEL.pose(HOME).position)
     assert clear_order(CollisionModel(MODEL, (everywhere,)), HOME, goal, [4, 5], clear) == []
-
-
-def test_the_base_is_driven_by_itself_where_the_mask_or_the_device_asks_for_it():
-    """The script is told so in these modes and in no other."""
-    driving: list[bool] = []
-    task = TaskSpec("any", "", lambda model, gains, drives: driving.append(drives), "")
-    for mode in MODES.values():
-        scripted_operator(MODEL, mode, task, HumanSettings())
-    told = {name for name, drives in zip(MODES, driving, strict=True) if drives}
-    assert told == {"switching", "decoupled", "direct_single"}

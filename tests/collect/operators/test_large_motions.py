@@ -1,23 +1,18 @@
 """Large motions of the hand: without folding the arm, without leaning, without hitting the cabinet."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
+from collect_helpers import episode
 from device_helpers import HOME, MODEL, PERFECT, drive, first_view
 
 from handrail.collect.commands.recording import episode_seed
-from handrail.collect.config import SessionConfig
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.drawer import before_driving
 from handrail.collect.operators.scripted.placement import REACHED, arm_solutions, straight_solution
 from handrail.collect.operators.scripted.steering import Gains, MotionGoal, Target, hand_twist, pose_errors
-from handrail.collect.session.build import build_env, build_session
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose
 
-START = MODEL.pose(HOME)
 DOWN = np.diag([1.0, -1.0, -1.0])
 
 
@@ -110,22 +105,9 @@ def test_one_axis_at_a_time_keeps_the_hand_upright_where_it_must_not_lean(view):
     assert worst[np.inf] > 0.12
 
 
-def test_the_hand_is_made_ready_where_the_base_will_bring_it():
-    now, stand = np.array([-1.5, 0.1, -0.2]), np.array([-0.4, 0.6, 0.3])
-    q = HOME.copy()
-    q[:3] = stand
-    there = MODEL.pose(q)
-    q[:3] = now
-    ready = before_driving(there, stand, now)
-    np.testing.assert_allclose(ready.position, MODEL.pose(q).position, atol=1e-9)
-    np.testing.assert_allclose(ready.rotation, MODEL.pose(q).rotation, atol=1e-9)
-
-
-@pytest.mark.parametrize("episode", [1, 3])
-def test_an_expert_by_joints_turns_the_hand_over_without_touching_himself(episode):
+@pytest.mark.parametrize("person", [1, 3])
+def test_an_expert_by_joints_turns_the_hand_over_without_touching_himself(person):
     """By the hand's way, the palm was pressed against the forearm for 20 s."""
-    config = SessionConfig(task="reach", mode="direct", person=episode)
-    with closing(build_env(config, 20)) as env:
-        outcome = build_session(config, env).run(episode_seed(900, episode))
+    outcome = episode(episode_seed(900, person), task="reach", mode="direct", person=person)
     assert outcome.success
     assert outcome.contact_onsets == 0

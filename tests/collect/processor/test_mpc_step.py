@@ -162,15 +162,6 @@ def test_odometry_follows_a_circle():
     assert pose == pytest.approx(exact, abs=1e-4)
 
 
-def test_values_go_there_and_back():
-    units = robot_units(degrees(), load_model().description)
-    q, twist = np.random.default_rng(0).normal(size=6), np.array([0.1, -0.2, 0.3])
-    reading = units.read(units.action(q, np.zeros(6), twist, 0.25))
-    assert reading.arm == pytest.approx(q)
-    assert reading.twist == pytest.approx(twist)
-    assert reading.opening == pytest.approx(0.75)
-
-
 def test_velocities_are_sent_where_the_robot_takes_them():
     units = degrees()
     for joint in units["joints"].values():

@@ -9,11 +9,10 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+from collect_helpers import episode
 from command_helpers import command
 
-from handrail.collect.config import SessionConfig
 from handrail.collect.session import viewer
-from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.display import Display, Drawing
 from handrail.datasets.reading.reader import read_info
 
@@ -98,13 +97,6 @@ def test_what_goes_wrong_in_drawing_is_said_once_and_no_more(monkeypatch):
     said = []
     display = Display(say=said.append)
     monkeypatch.setattr(Drawing, "see", lambda self, frame: 1 / 0)
-    config = SessionConfig(task="reach", time_limit=1.0)
-    build_session(config, build_env(config, 20), [display]).run(2)
+    episode(2, display, task="reach", time_limit=1.0)
     display.close()
     assert said == ["display: division by zero; the recording goes on"]
-
-
-def test_one_viewer_at_a_time(tmp_path):
-    done = command("--display_data", "--display_web", tmp_path / "set")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "--display_data and --display_web: expected one of them" in done.stderr

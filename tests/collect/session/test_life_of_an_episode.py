@@ -108,23 +108,6 @@ def test_a_pause_brakes_holds_and_goes_on(env, controller):
     assert np.abs(np.diff(q, axis=0)).max() < 0.02
 
 
-def test_a_late_operator_is_braked(env):
-    """Who asks for the same thing with the same stamp again and again is not there any more."""
-    person = Person(env.model, {})
-    steer, said = person.act, []
-
-    def act(view):
-        if len(said) < 10:
-            said.append(steer(view))
-        return said[-1]
-
-    person.act, watcher = act, Watcher()
-    outcome = Session(env, DirectController(env.model, env.period), person, [watcher]).run(3)
-    assert outcome.failure_reason == "timeout"
-    assert watcher.frames[-1].diagnostics.status is Status.STALE_INTENT
-    assert not watcher.frames[60].action[:-1].any()
-
-
 @pytest.mark.parametrize("event", [DISCARD, RESTART, QUIT])
 def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
     with recording(tmp_path / "d", env) as recorder:

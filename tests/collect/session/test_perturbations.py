@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from collect_helpers import Watcher, action, environment
+from collect_helpers import Motionless, Watcher, action, environment
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.operator import View
@@ -15,7 +15,6 @@ from handrail.collect.world.tasks.reach import Reach
 from handrail.collect.world.tasks.tray import Tray
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
@@ -29,17 +28,6 @@ def test_what_is_written_is_what_is_read():
     assert Perturbation.parse("push+shift+delay").sizes == DEFAULTS
     assert Perturbation.parse(" push + delay:5 ").words == "pushed delayed:5"
     assert Perturbation.parse("none") == Perturbation()
-
-
-class Motionless:
-    """Asks for nothing, and notes what it sees."""
-
-    def reset(self, view, rng):
-        self.seen = []
-
-    def act(self, view):
-        self.seen.append(view)
-        return Intent.idle(Channels.of(MODEL.description), time=view.state.time)
 
 
 def path(env, seed, disturbances=(), controller=None):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from collect_helpers import Watcher, write_small_robot
+from collect_helpers import Watcher, episode, write_small_robot
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -24,9 +24,8 @@ from handrail.controllers.mpc.safety_filter import safety_filter
 
 
 def run(seed=3, **settings):
-    watcher, config = Watcher(), SessionConfig(**settings)
-    outcome = build_session(config, build_env(config, 20), [watcher]).run(seed)
-    return outcome, watcher.frames
+    watcher = Watcher()
+    return episode(seed, watcher, **settings), watcher.frames
 
 
 @pytest.mark.parametrize("mode", sorted(set(MODES) - {"base"}))
@@ -94,16 +93,6 @@ def test_a_mask_of_ones_own():
     assert {"".join(map(str, frame.intent.mask.astype(int))) for frame in watcher.frames} == {mask}
     with pytest.raises(HandrailError, match="expected 18 characters 0 or 1"):
         build_mode(SessionConfig(mask="0101"), env.model)
-
-
-def test_controllers_follow_the_mode():
-    env = build_env(SessionConfig(task="reach"), 20)
-    assert isinstance(build_controller(MODES["direct"], env.model, 20), DirectController)
-    assert isinstance(build_controller(MODES["ee"], env.model, 20), MaskedMpc)
-    assert isinstance(build_controller(MODES["direct_cbf"], env.model, 20), CbfFilter)
-    filtered = build_controller(MODES["direct_filtered"], env.model, 25)
-    assert isinstance(filtered, MaskedMpc)
-    assert filtered.settings == safety_filter(env.model, 0.04).settings
 
 
 def test_a_second_robot_is_a_new_description_and_nothing_else(tmp_path):

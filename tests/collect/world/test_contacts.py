@@ -5,27 +5,6 @@ from collect_helpers import action, environment
 
 from handrail.collect.world.scene import Scene, SceneObject, box
 from handrail.collect.world.task import Start
-from handrail.collect.world.tasks.furniture import pillar
-
-
-def in_the_way(env) -> Start:
-    env.reset(seed=0)
-    episode = env.start
-    block = pillar("block", -0.7, 0.0, 0.15, 0.4)
-    return Start(Scene((*episode.scene.objects, block)), episode.q, episode.goal)
-
-
-def test_driving_into_an_obstacle_is_counted_and_ends_nothing():
-    with environment("Reach") as env:
-        env.reset(options={"start": in_the_way(env)})
-        seen, terminated = set(), False
-        for _ in range(40):
-            *_, terminated, _, info = env.step(action(env, [1.0] + [0.0] * 8))
-            assert info["contacts"] == len(info["contact_names"])
-            seen.update(info["contact_names"])
-        assert seen == {"block – chassis"}
-        assert not terminated
-        assert env.state().q[0] < -1.5 + 0.3  # the block held it
 
 
 def test_touching_oneself_is_counted():

@@ -1,8 +1,10 @@
 """What the fingers hold, and that the loop tells the controller of it."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
-from collect_helpers import action, environment, over_cube
+from collect_helpers import action, environment, episode, hold, over_cube
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.scripted.pick_place import tips_beyond_tool
@@ -11,7 +13,6 @@ from handrail.collect.session.build import (
     build_env,
     build_mode,
     build_operator,
-    build_session,
 )
 from handrail.collect.session.session import Session
 from handrail.collect.world.task import Start
@@ -24,8 +25,7 @@ def test_the_fingers_hold_what_both_of_them_touch():
     with environment("PickPlace") as env:
         env.reset(options={"start": over_cube(env, 3, 0.01)})
         assert env.simulation.held() == ()
-        for _ in range(20):
-            env.step(action(env, gripper=1.0))
+        hold(env, 20, gripper=1.0)
         (cube,) = env.simulation.held()
         assert cube.name == "cube"
         assert [each.name for each in env.obstacles() if each.held] == ["cube"]
@@ -33,15 +33,14 @@ def test_the_fingers_hold_what_both_of_them_touch():
         now, tool = env.task_state().pose("cube"), env.task_state().tool
         np.testing.assert_allclose(tool.position + tool.rotation @ cube.position, now.position, atol=1e-9)
         np.testing.assert_allclose(tool.rotation @ cube.rotation, now.rotation, atol=1e-9)
-        for _ in range(20):
-            env.step(action(env))
+        hold(env, 20)
         assert env.simulation.held() == ()
 
 
 def test_fingers_that_rest_on_a_thing_do_not_hold_it():
     with environment("PickPlace") as env:
-        episode = over_cube(env, 3, 0.045)  # the finger tips 5 mm above the cube
-        env.reset(options={"start": Start(episode.scene, episode.q, grip=0.0)})
+        start = over_cube(env, 3, 0.045)  # the finger tips 5 mm above the cube
+        env.reset(options={"start": Start(start.scene, start.q, grip=0.0)})
         touched = False
         for _ in range(30):
             down = np.linalg.pinv(env.model.jacobian(env.state().q)) @ [0.0, 0.0, -0.01, 0.0, 0.0, 0.0]
@@ -58,8 +57,7 @@ def test_fingers_that_rest_on_a_thing_do_not_hold_it():
 def test_a_held_tray_is_the_box_around_its_parts():
     with environment("Tray") as env:
         env.reset(seed=2)
-        for _ in range(3):
-            env.step(action(env, gripper=1.0))
+        hold(env, 3, gripper=1.0)
         (tray,) = env.simulation.held()
         item, now, tool = env.start.scene.find("tray"), env.task_state().pose("tray"), env.task_state().tool
         corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T * tray.shape.size
@@ -92,13 +90,10 @@ class Watch:
 
 def test_a_session_tells_the_controller_what_is_held_until_it_is_let_go():
     config = SessionConfig(task="tray", mode="ee", noise=0.0)
-    env = build_env(config, 20)
-    try:
+    with closing(build_env(config, 20)) as env:
         mode = build_mode(config, env.model)
         watch = Watch(build_controller(mode, env.model, 20, "tray"))
         outcome = Session(env, watch, build_operator(config, mode, env.model)).run(seed=1)
-    finally:
-        env.close()
     assert outcome.success
     assert outcome.contact_onsets == 0
     assert watch.told[0] == ("tray",)
@@ -129,20 +124,14 @@ class Closing:
 )
 def test_the_operator_closes_the_gripper_around_the_cube(robot, mode):
     """The cube is between the fingers, with what the hand may be turned; their tips are beside it."""
-    config = SessionConfig(task="pick_place", mode=mode, robot=robot)
-    model, edge = load_model(robot), 0.05
+    model, edge, watch = load_model(robot), 0.05, Closing()
     gripper = model.description.end_effector.gripper
-    env, watch = build_env(config, 20), Closing()
-    try:
-        session = build_session(config, env, [watch])
-        outcome = session.run(100)
-        assert outcome.success
-        if mode != "direct":
-            assert (outcome.contact_onsets, outcome.brakes) == (0, 0)
-            assert outcome.smallest_distance >= 0.05
-        assert len(watch.masks) == (2 if mode == "switching" else 1)
-    finally:
-        env.close()
+    outcome = episode(100, watch, task="pick_place", mode=mode, robot=robot)
+    assert outcome.success
+    if mode != "direct":
+        assert (outcome.contact_onsets, outcome.brakes) == (0, 0)
+        assert outcome.smallest_distance >= 0.05
+    assert len(watch.masks) == (2 if mode == "switching" else 1)
     tips = {"ridgeback_ur10": 0.015, "ridgeback_panda": 0.0095}[robot]  # beyond the tool point
     assert tips_beyond_tool(model) == pytest.approx(tips)
     for across, _, along in watch.offsets:

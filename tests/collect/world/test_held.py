@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, Robot, intent
 
 from handrail.controllers.baselines.cbf_filter import CbfFilter
 from handrail.controllers.baselines.direct import DirectController
@@ -11,15 +12,11 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
-from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.rotation import matrix_from_rpy
-from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 
-MODEL = load_model()
-HOME = MODEL.description.home
+MPC = MaskedMpc(MODEL)
 TURN = matrix_from_rpy([0.3, -0.2, 0.5])
 BOX = Obstacle("box", Shape("box", [0.4, 0.3, 0.4]), [0.02, 0.05, 0.1], TURN, frame="tool")
 POST = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.8, 0.6])
@@ -55,26 +52,6 @@ def test_a_held_thing_is_where_the_hand_takes_it():
                 assert collision.values(q[None])[0, row] == pytest.approx(other, abs=1e-5)
 
 
-def test_gradients_and_bounds_of_held_things():
-    rng, h = np.random.default_rng(1), 1e-3
-    collision = CollisionModel(MODEL, (POST, BOX))
-    rows, errors = held_rows(collision), []
-    for _ in range(30):
-        q = rng.uniform(-1.5, 1.5, MODEL.size)
-        distances = collision.distances(q[None])
-        steps = h * np.eye(MODEL.size)
-        slopes = ((collision.values(q + steps) - collision.values(q - steps)) / (2 * h)).T
-        apart = [row for row in rows if distances.values[0, row] > 0.02]
-        errors += np.abs(distances.gradients - slopes)[apart].max(axis=1).tolist()
-        path = q + np.cumsum(rng.uniform(-0.05, 0.05, (30, MODEL.size)), axis=0)
-        exact = collision.values(path)
-        cheap = collision.values(path, None, (path[0], exact[0]), np.full(collision.size, 0.15))
-        assert np.all(cheap <= exact + 1e-5)
-    assert len(errors) > 100
-    assert np.median(errors) < 1e-3
-    assert np.quantile(errors, 0.98) < 2e-2
-
-
 def test_what_is_held_does_not_come_nearer_because_other_things_come():
     """What it keeps once it keeps on; to what came while it was held, what there was then."""
     other = replace(POST, name="other")
@@ -103,34 +80,25 @@ def test_things_come_and_go_and_change():
         collision.among((POST, Obstacle("box", BOX.shape, BOX.position, frame="nowhere")))
 
 
-def towards_the_base(controller, held, seconds=8.0, period=0.05):
+def towards_the_base(held):
     """Ask the hand to come to the base at rest; return the box's least distance from the robot on the way."""
-    truth, q, v = CollisionModel(MODEL, (BOX,)), np.array(HOME), np.zeros(MODEL.size)
-    mask = controller.channels.mask("base", "ee")
-    goal = MODEL.pose(q, "planar_base").position + [0.2, 0.0, 1.0]
-    rows, smallest, statuses = held_rows(truth), np.inf, []
-    for k in range(int(seconds / period)):
-        controller.update_scene((BOX,) if held else ())
-        direction = goal - MODEL.pose(q).position
-        values = np.zeros(controller.channels.size)
-        values[controller.channels.tool_slice][:3] = 0.3 * direction / max(np.linalg.norm(direction), 0.1)
-        command = controller.update(State(q, v, k * period), Intent(values, mask, time=k * period))
-        after = command.velocity(period)
-        q, v = q + period * 0.5 * (v + after), after
-        smallest = min(smallest, truth.values(q[None])[0, rows].min())
-        statuses.append(command.diagnostics.status)
-    return smallest, statuses
+    robot, truth, smallest = Robot(MPC), CollisionModel(MODEL, (BOX,)), np.inf
+    robot.put(*((BOX,) if held else ()))
+    goal = MODEL.pose(HOME, "planar_base").position + [0.2, 0.0, 1.0]
+    for _ in range(160):
+        direction, values = goal - MODEL.pose(robot.q).position, np.zeros(CHANNELS.size)
+        values[CHANNELS.tool_slice][:3] = 0.3 * direction / max(np.linalg.norm(direction), 0.1)
+        robot.update(intent(values, "base", "ee", time=robot.time))
+        smallest = min(smallest, truth.values(robot.q[None])[0, held_rows(truth)].min())
+    return smallest, {command.diagnostics.status for command in robot.commands}
 
 
 def test_the_mpc_keeps_what_the_hand_holds_from_the_robot():
-    mpc = MaskedMpc(MODEL)
-    mpc.reset()
-    ignorant, _ = towards_the_base(mpc, held=False)
-    mpc.reset()
-    kept, statuses = towards_the_base(mpc, held=True)
+    ignorant, _ = towards_the_base(held=False)
+    kept, statuses = towards_the_base(held=True)
     assert ignorant < 0.0  # it would run into itself
-    assert kept > mpc.settings.margin - 5e-3
-    assert set(statuses) == {Status.OK}
+    assert kept > MPC.settings.margin - 5e-3
+    assert statuses == {Status.OK}
 
 
 @pytest.mark.parametrize(("build", "group"), [(MaskedMpc, "ee"), (MaskedMpc, "joint"), (CbfFilter, "joint")])
@@ -141,23 +109,17 @@ def test_a_grasp_beside_an_obstacle_moves_nothing_and_the_thing_may_come_away(bu
     ahead = tool.rotation[:, 2]
     wall = Obstacle("wall", Shape("box", [0.02] * 3), tool.position + (length + 0.015) * ahead, tool.rotation)
     truth = CollisionModel(MODEL, (wall, rod))
-    row, period = truth.pairs.index(("rod", "wall")), 0.05
-    controller = build(MODEL)
-    controller.reset((wall,))
-    q, v, gaps, hand = np.array(HOME), np.zeros(MODEL.size), [], []
+    row, gaps, hand = truth.pairs.index(("rod", "wall")), [], []
+    robot = Robot(build(MODEL), (wall,))
+    robot.put(wall, rod)
     for k in range(160):
-        controller.update_scene((wall, rod))
         rate = 0.0 if k < 40 else -0.05 if k < 100 else 0.05  # rest, away, back
-        mask, values = controller.channels.mask(group), np.zeros(controller.channels.size)
-        twist = np.append(rate * ahead, np.zeros(3))
-        values[controller.channels.tool_slice] = twist if group == "ee" else 0.0
-        joints = np.linalg.pinv(MODEL.jacobian(q)) @ twist
-        values[controller.channels.joint_slice] = joints if group == "joint" else 0.0
-        command = controller.update(State(q, v, k * period), Intent(values, mask, time=k * period))
-        after = command.velocity(period)
-        q, v = q + period * 0.5 * (v + after), after
-        gaps.append(truth.values(q[None])[0, row])
-        hand.append(MODEL.pose(q).position)
+        twist, values = np.append(rate * ahead, np.zeros(3)), np.zeros(CHANNELS.size)
+        values[CHANNELS.tool_slice] = twist
+        values[CHANNELS.joint_slice] = np.linalg.pinv(MODEL.jacobian(robot.q)) @ twist
+        robot.update(intent(values, group, time=robot.time))
+        gaps.append(truth.values(robot.q[None])[0, row])
+        hand.append(MODEL.pose(robot.q).position)
     assert np.linalg.norm(hand[39] - tool.position) < 2e-3
     assert gaps[39] == pytest.approx(0.005, abs=2e-3)
     assert gaps[99] > 0.1
@@ -166,20 +128,13 @@ def test_a_grasp_beside_an_obstacle_moves_nothing_and_the_thing_may_come_away(bu
 
 @pytest.mark.parametrize("build", [MaskedMpc, CbfFilter, DirectController])
 def test_a_grasp_on_the_way_does_not_jerk_the_robot(build):
-    controller = build(MODEL)
-    controller.reset((POST,))
-    channels, period, limits = controller.channels, 0.05, MODEL.description.limits
-    values = np.zeros(channels.size)
-    values[channels.joint_slice] = 0.2 * np.sin(np.arange(MODEL.size))
-    mask = channels.mask("joint")
-    q, v = np.array(HOME), np.zeros(MODEL.size)
+    robot, values = Robot(build(MODEL), (POST,)), np.zeros(CHANNELS.size)
+    values[CHANNELS.joint_slice] = 0.2 * np.sin(np.arange(MODEL.size))
     for k in range(30):
-        controller.update_scene((POST, BOX) if 10 <= k < 20 else (POST,))
-        command = controller.update(State(q, v, k * period), Intent(values, mask, time=k * period))
-        after = command.velocity(period)
-        assert np.all(np.abs(after - v) <= limits.acceleration * period * (1 + 1e-6) + 1e-9)
+        robot.put(*((POST, BOX) if 10 <= k < 20 else (POST,)))
+        command = robot.update(intent(values, "joint", time=robot.time))
         assert not command.diagnostics.status.brakes
-        q, v = q + period * 0.5 * (v + after), after
+    assert np.all(np.abs(robot.steps) <= LIMITS.acceleration * PERIOD * (1 + 1e-6) + 1e-9)
 
 
 def test_a_thing_that_has_slipped_is_where_it_is_now():

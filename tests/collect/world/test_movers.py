@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from collect_helpers import action, environment
+from collect_helpers import Motionless, Watcher, action, environment, episode
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.session.build import build_env, build_session
+from handrail.collect.session.build import build_env
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.observation import MOST, from_numbers, to_numbers
@@ -17,8 +17,6 @@ from handrail.collect.world.tasks.reach import FASTEST, Reach, sample_movers
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -103,59 +101,23 @@ class Meeting(Reach):
         return Start(Scene((item,)), HOME, Pose(np.array([0.0, 0.0, 9.0]), np.eye(3)))
 
 
-class Idle:
-    """Touches nothing."""
-
-    def reset(self, view, rng):
-        self._channels = Channels.of(MODEL.description)
-
-    def act(self, view):
-        return Intent.idle(self._channels, view.state.time)
-
-
 @pytest.mark.parametrize(("kind", "touched"), [(MaskedMpc, False), (DirectController, True)])
 def test_a_robot_that_nobody_steers_steps_aside(kind, touched):
     """The session tells the controller what comes; what stands still is hit, and that is counted."""
     env = HandrailEnv(Meeting())
-    outcome = Session(env, kind(env.model), Idle()).run(0)
+    outcome = Session(env, kind(env.model), Motionless()).run(0)
     env.close()
     assert (outcome.contact_onsets > 0) == touched
     assert (outcome.smallest_distance < 0.0) == touched
 
 
-@pytest.mark.parametrize("count", [0, 1])
-def test_the_controller_observes_before_every_update_if_anything_moves(count):
-    class Witness(DirectController):
-        def update_scene(self, obstacles):
-            super().update_scene(obstacles)
-            seen.append((obstacles, float(env.simulation.data.time)))
-
-        def update(self, state, intent):
-            assert not count or seen[-1][1] == state.time
-            return super().update(state, intent)
-
-    seen, env = [], HandrailEnv(Reach(horizon=3.0, moving_obstacles=count))
-    outcome = Session(env, Witness(env.model), Idle()).run(0)
-    env.close()
-    assert len(seen) == count * outcome.frames
-    if count:
-        places = np.array([obstacles[0].position for obstacles, _ in seen])
-        assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() <= 1.01 * FASTEST / 20
-        assert np.linalg.norm(places[-1] - places[0]) > 0.5
-
-
 def test_an_episode_among_movers_is_the_seeds():
-    def run():
-        config = SessionConfig(task="reach", moving_obstacles=1)
-        env = build_env(config, 20)
-        outcome = build_session(config, env).run(3)
-        return outcome, env.state().q
-
-    (first, q), (again, same) = run(), run()
-    assert first.success
-    assert first.contact_onsets == 0
-    assert first.frames == again.frames
-    np.testing.assert_array_equal(q, same)
+    first, again = Watcher(), Watcher()
+    outcome, _ = (episode(3, each, task="reach", moving_obstacles=1) for each in (first, again))
+    assert outcome.success
+    assert outcome.contact_onsets == 0
+    for one, same in zip(first.frames, again.frames, strict=True):
+        np.testing.assert_array_equal(one.state, same.state)
 
 
 def test_what_stands_around_becomes_numbers_and_back():

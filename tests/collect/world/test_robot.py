@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from collect_helpers import environment, write_small_robot
+from collect_helpers import environment, hold, write_small_robot
 
 from handrail.collect.world.geometry import bounding_box
 from handrail.collect.world.gl import mujoco
@@ -71,14 +71,6 @@ def test_mass_matrix_is_pinocchios_plus_drives_gripper_and_chassis(model):
     arm = slice(base, model.size)
     np.testing.assert_allclose(M[arm, arm], expected[arm, arm], atol=2e-3)
     np.testing.assert_allclose(M[:base, arm], expected[:base, arm], atol=2e-3)
-
-
-def test_home_puts_the_tool_where_the_real_robot_has_it():
-    model = load_model()
-    simulation = Simulation(model, Scene(), np.array(model.description.home), 0.05)
-    np.testing.assert_allclose(simulation.tool.position, [-0.010, 0.174, 0.703], atol=1e-3)
-    approach = simulation.tool.rotation[:, 2]
-    np.testing.assert_allclose(approach, [1.0, 0.0, 0.0], atol=1e-6)
 
 
 def test_home_touches_nothing(model):
@@ -188,16 +180,11 @@ def test_fingers_close_and_open_at_their_speed(robot):
         gripper = env.model.description.end_effector.gripper
         assert gripper is not None
         steps = int(np.ceil(gripper.stroke / gripper.speed * env.fps))
-        hold = np.zeros(env.model.size + 1, np.float32)
-        hold[-1] = 1.0
-        for _ in range(steps // 2):
-            env.step(hold)
+        hold(env, steps // 2, gripper=1.0)
         assert 0.3 < env.simulation.opening < 0.7
-        for _ in range(steps):
-            env.step(hold)
+        hold(env, steps, gripper=1.0)
         assert env.simulation.opening < 0.01
-        for _ in range(2 * steps):
-            env.step(np.zeros_like(hold))
+        hold(env, 2 * steps)
         assert env.simulation.opening > 0.99
 
 

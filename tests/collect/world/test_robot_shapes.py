@@ -11,9 +11,6 @@ from coal_helpers import by_coal
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.shape_pairs import FLOOR
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
-from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description, robot_names
 from handrail.controllers.robot.model import RobotModel, load_model
@@ -55,29 +52,6 @@ def test_every_shape_sees_a_ball_in_it(model):
         inside = pose.position + pose.rotation @ placed.placement.translation + 0.002
         collision = CollisionModel(model, (Obstacle("ball", Shape("sphere", [0.02]), inside),))
         assert collision.values(home[None])[0, collision.pairs.index((placed.name, "ball"))] < 0.0
-
-
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_the_shoulder_keeps_from_a_ball_over_the_deck(model, side):
-    """Driven at it sideways, the chassis passes below it; the robot goes around, or stops."""
-    q, previous = np.array(model.description.home), np.zeros(model.size)
-    shoulder = next(placed for placed in model.description.collision if placed.name == "shoulder")
-    pose = model.pose(q, shoulder.frame)
-    centre = pose.position + pose.rotation @ shoulder.placement.translation
-    ball = Obstacle("ball", Shape("sphere", [0.03]), centre + [0.0, 0.6 * side, 0.0])
-    controller, exact = MaskedMpc(model), CollisionModel(model, (ball,))
-    controller.reset((ball,))
-    mask = controller.channels.mask("base")
-    values = np.where(mask, 0.4 * side * (np.arange(len(mask)) == 1), 0.0)
-    nearest, period = np.inf, 0.05
-    for k in range(80):
-        command = controller.update(State(q, previous, k * period), Intent(values, mask, time=k * period))
-        velocity = command.velocity(period)
-        q = q + period * (previous + velocity) / 2
-        previous = velocity
-        nearest = min(nearest, float(exact.values(q[None]).min()))
-    assert side * q[1] > 0.2
-    assert nearest > 0.5 * controller.settings.margin
 
 
 def test_only_what_cannot_touch_the_floor_is_not_checked_against_it(model):

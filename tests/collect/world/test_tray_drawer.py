@@ -4,16 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from collect_helpers import action, environment, moved
+from collect_helpers import environment, episode, hold, moved
 
 from handrail.collect.commands.recording import episode_seed
-from handrail.collect.config import SessionConfig
-from handrail.collect.session.build import build_env, build_session, build_task
-from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.drawer import HANDLE, TRAVEL, Drawer, handle, inward, opened
 from handrail.collect.world.tasks.tray import Tray
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import robot_names
 from handrail.controllers.robot.model import load_model
 
@@ -39,20 +35,8 @@ class Watcher:
 
 
 def run(task, mode="ee", noise=0.0, seed=1, robot="ridgeback_ur10"):
-    config = SessionConfig(task=task, mode=mode, noise=noise, robot=robot)
-    env, watcher = build_env(config, 20), Watcher()
-    outcome = build_session(config, env, [watcher]).run(seed)
-    env.close()
-    return outcome, watcher
-
-
-def hold(env: HandrailEnv, steps: int, gripper: float) -> dict:
-    info = {}
-    for _ in range(steps):
-        *_, terminated, _, info = env.step(action(env, gripper=gripper))
-        if terminated:
-            break
-    return info
+    watcher = Watcher()
+    return episode(seed, watcher, task=task, mode=mode, noise=noise, robot=robot), watcher
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -108,10 +92,10 @@ def test_the_gripper_holds_the_tray_and_dropping_it_fails(robot):
 def test_a_can_beside_or_under_the_tray_fails(offset):
     with environment("Tray") as env:
         env.reset(seed=0)
-        episode = env.start
-        place = episode.scene.find("tray").position + offset
-        scene = moved(episode, "can", place).scene
-        env.reset(options={"start": replace(episode, scene=scene)})
+        start = env.start
+        place = start.scene.find("tray").position + offset
+        scene = moved(start, "can", place).scene
+        env.reset(options={"start": replace(start, scene=scene)})
         assert hold(env, 5, 1.0)["failure_reason"] == "can_fell"
 
 
@@ -120,25 +104,20 @@ def test_a_tilted_hand_spills_the_can():
         env.reset(seed=0)
         wrist = np.zeros(env.model.size)
         wrist[6] = 0.8  # a quarter turn in two seconds
-        info = {"failure_reason": ""}
-        for _ in range(60):
-            *_, terminated, _, info = env.step(action(env, wrist, 1.0))
-            if terminated:
-                break
-        assert info["failure_reason"] == "can_fell"
+        assert hold(env, 60, 1.0, wrist)["failure_reason"] == "can_fell"
 
 
 @pytest.mark.parametrize(("grip", "success"), [(None, True), (0.0, False)])
 def test_the_tray_has_to_be_left_on_the_table(grip, success):
     with environment("Tray") as env:
         env.reset(seed=0)
-        episode = env.start
-        table, tray, can = (episode.scene.find(name) for name in ("table", "tray", "can"))
+        start = env.start
+        table, tray, can = (start.scene.find(name) for name in ("table", "tray", "can"))
         place = np.array([*table.position[:2], table.top + 0.012])
         on_it = place + tray.rotation.T @ (can.position - tray.position)
-        scene = moved(episode, "tray", place).scene
-        scene = moved(Start(scene, episode.q), "can", on_it).scene
-        env.reset(options={"start": Start(scene, episode.q, grip=grip)})
+        scene = moved(start, "tray", place).scene
+        scene = moved(Start(scene, start.q), "can", on_it).scene
+        env.reset(options={"start": Start(scene, start.q, grip=grip)})
         info = hold(env, 40, float(grip is not None))
         assert info["is_success"] == success, info
 
@@ -147,14 +126,14 @@ def test_the_tray_has_to_be_left_on_the_table(grip, success):
 def test_tray_scenes_follow_their_description(robot):
     model, sides = load_model(robot), set()
     for seed in (*SEEDS, 160, 165):  # 165: the UR10 cannot hold the tray at the first place drawn
-        episode = Tray().sample(model, np.random.default_rng(seed))
-        table, tray = episode.scene.find("table"), episode.scene.find("tray")
+        start = Tray().sample(model, np.random.default_rng(seed))
+        table, tray = start.scene.find("table"), start.scene.find("tray")
         sides.add(float(np.sign(table.position[1])))
-        assert episode.q[1] * table.position[1] < 0  # it has to cross
+        assert start.q[1] * table.position[1] < 0  # it has to cross
         assert 0.55 <= table.top <= 0.65
         assert tray.rotation[2, 2] == pytest.approx(1.0, abs=1e-3)
-        assert len([item for item in episode.scene.objects if item.name.startswith("obstacle")]) in (2, 3)
-        tool = model.pose(episode.q).position
+        assert len([item for item in start.scene.objects if item.name.startswith("obstacle")]) in (2, 3)
+        tool = model.pose(start.q).position
         np.testing.assert_allclose(tool - tray.position, [0, 0, 0.2], atol=1e-3)
     assert sides == {-1.0, 1.0}
 
@@ -206,21 +185,3 @@ def test_a_thing_weighs_what_the_task_says():
             for name in names:
                 body = env.simulation.mujoco_model.body(name)
                 assert body.mass[0] == pytest.approx(env.start.scene.find(name).mass)
-
-
-@pytest.mark.parametrize("task", ["drawer", "pick_place", "reach", "tray"])
-def test_the_time_limit_is_a_setting(task):
-    own = build_task(SessionConfig(task=task))
-    assert build_task(SessionConfig(task=task, time_limit=12.0)) == replace(own, horizon=12.0)
-    with pytest.raises(HandrailError, match="--time_limit: expected a number >= 0"):
-        SessionConfig(task=task, time_limit=-1.0).check()
-
-
-def test_features_are_named_and_finite():
-    for name, task in (("Tray", Tray()), ("Drawer", Drawer())):
-        with environment(name) as env:
-            env.reset(seed=0)
-            numbers = task.features(env.task_state())
-            assert numbers.shape == (len(task.state_names),)
-            assert np.isfinite(numbers).all()
-            assert len(set(task.state_names)) == len(task.state_names)
