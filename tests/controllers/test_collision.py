@@ -5,6 +5,7 @@ import pytest
 
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 
@@ -14,9 +15,11 @@ MODEL = load_model()
 def scene(rng):
     shapes = [Shape("box", [0.3, 0.2, 0.5]), Shape("cylinder", [0.2, 0.5]), Shape("sphere", [0.2])]
     shapes.append(Shape("capsule", [0.1, 0.4]))
-    return tuple(
+    standing = [
         Obstacle(f"o{i}", shape, rng.uniform([-1, -1, 0], [2, 2, 1.5])) for i, shape in enumerate(shapes)
-    )
+    ]
+    turn = matrix_from_rpy([0.3, -0.2, 0.5])
+    return (*standing, Obstacle("held", Shape("box", [0.4, 0.3, 0.4]), [0.02, 0.05, 0.1], turn, frame="tool"))
 
 
 def test_gradients_are_the_derivatives_of_the_distances():

@@ -18,7 +18,7 @@ from handrail.controllers.baselines.arm_completion import (
     WeldedBaseCompletion,
     clamp_twist,
 )
-from handrail.controllers.baselines.base_following import FREE, BaseFollowingCompletion
+from handrail.controllers.baselines.base_following import BaseFollowingCompletion
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, blended, tool_twist
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -125,26 +125,6 @@ def test_a_blend_gives_the_hand_what_both_give_it(twist, alpha):
         np.testing.assert_allclose(blend, operator if alpha else autonomy, atol=1e-12)
 
 
-def test_a_base_that_follows_keeps_the_hand_in_its_place():
-    """Pull the hand away: the base follows until the hand is back within the free distance of its place."""
-    q, hand = HOME.copy(), MODEL.pose(HOME).position
-    q[:2] -= [0.6, 0.3]  # the same as the hand 0.67 m ahead of where it should be, were it held in the world
-
-    class Held(BaseFollowingCompletion):
-        """The hand stays where it is in the world."""
-
-        def _seen_from_base(self, q):
-            c, s = np.cos(q[2]), np.sin(q[2])
-            away = hand[:2] - q[:2]
-            return np.array([c * away[0] + s * away[1], -s * away[0] + c * away[1]])
-
-    rule = Held(MODEL)
-    np.testing.assert_allclose(rule.base_velocity(HOME), 0.0, atol=1e-12)
-    for _ in range(2000):
-        q[:3] += 0.01 * rule.base_velocity(q)
-    assert abs(np.linalg.norm(q[:2] - HOME[:2]) - FREE) < 0.02
-
-
 def test_a_base_that_follows_rests_when_nothing_is_asked():
     q, rule = HOME.copy(), BaseFollowingCompletion(MODEL)
     q[3] += 0.8  # the hand is out of its place
@@ -198,25 +178,6 @@ def test_who_completes_twists_refuses_other_channels_and_rests_without_any(name,
     command = controller(name).update(State(HOME, REST), intent(np.full(CHANNELS.size, 0.1), *groups))
     assert command.diagnostics.status is status
     np.testing.assert_array_equal(command.velocities, 0.0)
-
-
-def test_mink_keeps_its_distance():
-    """Drive the hand into the robot's own mount: plain least squares gets close, mink does not."""
-    pytest.importorskip("mink")
-    smallest = {}
-    for name in ("dls", "mink"):
-        rival, q, v = controller(name), HOME.copy(), REST
-        for step in range(500):
-            towards = MODEL.pose(q, "shoulder_link").position - MODEL.pose(q).position
-            twist = np.append(0.15 * towards / np.linalg.norm(towards), np.zeros(3))
-            command = rival.update(
-                State(q, v, step * STEP), intent(of_the_tool(twist), "ee", time=step * STEP)
-            )
-            after = command.velocity(STEP)
-            q, v = q + 0.5 * STEP * (v + after), after
-            smallest[name] = min(smallest.get(name, np.inf), command.diagnostics.smallest_distance)
-    assert smallest["dls"] < 0.02
-    assert smallest["mink"] > 0.04
 
 
 def test_an_arm_without_a_base_completes_too():

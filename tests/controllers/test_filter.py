@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from collect_helpers import environment
-from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, roll, without_shapes
+from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, Robot, roll, without_shapes
 
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.task import Start
@@ -67,20 +67,6 @@ def test_in_free_space_the_smallest_correction_is_the_clip(make):
     _, sent, _ = follow(make(ALONE, PERIOD), velocities)
     _, clipped, _ = follow(DirectController(ALONE, PERIOD), velocities)
     assert np.abs((sent - clipped) / LIMITS.velocity).max() < 1e-3
-
-
-def test_the_cost_is_that_of_the_multi_step_filter():
-    mpc = safety_filter(MODEL, PERIOD)
-    problem = mpc.build_problem(State(HOME, np.zeros(9)), asked(0.1 * LIMITS.velocity))
-    tracked = problem.weights[:, JOINTS]
-    shares = np.append(0.85 ** np.arange(5), np.zeros(problem.horizon - 5))
-    np.testing.assert_allclose(tracked / tracked[0], np.tile(shares[:, None], 9))
-    np.testing.assert_allclose(
-        problem.reference[:, JOINTS], np.tile(0.1 * LIMITS.velocity, (problem.horizon, 1))
-    )
-    others = np.delete(problem.weights, np.arange(JOINTS.start, JOINTS.stop), axis=1)
-    assert others.max() <= 1e-6 * tracked[0, 0]
-    assert problem.dt == PERIOD  # the first planned velocity is the command
 
 
 ROUND = load_model("lekiwi")  # turning brings its base no nearer to a wall
@@ -191,19 +177,11 @@ def test_the_cbf_filter_says_when_the_acceleration_is_not_enough():
 
 
 def test_the_cbf_filter_gives_way_to_what_comes():
-    controller, comes = CbfFilter(MODEL, PERIOD), 0.3
-    q, v, smallest = np.array(HOME), np.zeros(9), np.inf
-    controller.reset((POST,))
-    for step in range(80):
-        place = POST.position - np.array([comes * step * PERIOD, 0.0, 0.0])
-        seen = replace(POST, position=place, velocity=[-comes, 0.0, 0.0])
-        controller.update_scene((seen,))
-        command = controller.update(State(q, v, step * PERIOD), asked(np.zeros(9), step * PERIOD))
-        smallest = min(smallest, command.diagnostics.smallest_distance)
-        after = command.velocity(PERIOD)
-        q, v = q + PERIOD * 0.5 * (v + after), after
-    assert q[0] < HOME[0] - 0.2
-    assert smallest > 0.05
+    robot = Robot(CbfFilter(MODEL, PERIOD), (replace(POST, velocity=[-0.3, 0.0, 0.0]),))
+    for _ in range(80):
+        robot.update(asked(np.zeros(9), robot.time))
+    assert robot.q[0] < HOME[0] - 0.2
+    assert robot.smallest > 0.05
 
 
 def test_a_failed_qp_brakes(monkeypatch):

@@ -1,8 +1,5 @@
 """Who asked is told, once, that something is being compiled; what is in the cache is not compiled."""
 
-import subprocess
-import sys
-
 import casadi as ca
 import pytest
 
@@ -52,14 +49,3 @@ def test_without_a_compiler_the_numbers_are_the_same(told, tmp_path, monkeypatch
     for number in range(20):
         point = [0.1 * number, 2.0 - number, 0.3]
         assert fast(point).full().tolist() == slow(point).full().tolist()
-
-
-def test_a_command_says_it_on_standard_error_in_one_line():
-    code = (
-        "from handrail.scripts import cli;"
-        "from handrail.controllers.numerics.first_use import compiling;"
-        "cli.run(lambda: compiling() or compiling() or 0)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "Compiling the objectives of this robot, once; this takes seconds …\n"

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from ideal_robot import CHANNELS, HOME, MODEL, REST, asking, intent, roll
+from ideal_robot import CHANNELS, HOME, MODEL, asking, intent, roll
 
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.prediction import (
@@ -124,15 +123,6 @@ def test_a_prediction_of_another_shape_is_refused_before_anything_moves():
         mpc.update(State(HOME, np.zeros(MODEL.size)), intent(np.zeros(18), "ee"))
 
 
-def test_only_the_tracked_stages_are_tracked():
-    settings = MpcSettings(tracked_stages=4, decay=0.5)
-    np.testing.assert_allclose(settings.discounts, [1, 0.5, 0.25, 0.125, 0, 0, 0, 0, 0, 0])
-    mpc = MaskedMpc(MODEL, settings)
-    problem = mpc.build_problem(State(HOME, np.zeros(9)), intent(np.full(18, 0.1), "ee"))
-    assert np.all(problem.weights[3, 3:9] > 0)
-    assert np.all(problem.weights[4:, 3:9] == 0)
-
-
 def test_the_base_twist_is_meant_in_its_frame():
     turned = np.array(HOME)
     turned[2] = np.pi / 2
@@ -151,15 +141,6 @@ def test_the_tool_twist_is_meant_in_its_frame_and_at_its_point():
     at_point = twist[:3] + np.cross(twist[3:], rotation @ point)
     np.testing.assert_allclose(rotation.T @ at_point, [0.0, 0.0, 0.1], atol=5e-3)
     np.testing.assert_allclose(rotation.T @ twist[3:], [0.2, 0.0, 0.0], atol=5e-3)
-
-
-@pytest.mark.parametrize(
-    "frames", [Frames("moon"), Frames(tool="base"), Frames(point=[np.nan, 0, 0]), Frames(point=[0, 0])]
-)
-def test_a_frame_that_does_not_exist_brakes(frames):
-    MPC.reset()
-    command = MPC.update(State(HOME, REST), intent(np.full(18, 0.2), "ee", frames=frames))
-    assert command.diagnostics.status is Status.INVALID_INTENT
 
 
 def test_an_over_determined_command_is_a_compromise():

@@ -67,7 +67,3 @@ def test_what_a_controller_asked_for_before_does_not_matter(build):
         robot.update(ask(robot.time))
     state = State(HOME, 0.1 * LIMITS.velocity, robot.time, 0.2 * LIMITS.velocity)
     assert same(robot.controller.update(state, ask(robot.time)), build(MODEL).update(state, ask(robot.time)))
-
-
-def test_a_robot_that_says_nothing_moves_as_it_is_told():
-    np.testing.assert_array_equal(State(HOME, 0.1 * HOME).commanded, 0.1 * HOME)

@@ -1,15 +1,10 @@
 """Joints that cannot turn half around: which they are, when they are drawn to their middle, and what for."""
 
-from contextlib import closing
-
 import numpy as np
+from collect_helpers import episode
 
 from handrail.collect.commands.recording import episode_seed
-from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import MODES
-from handrail.collect.session.build import build_controller, build_env, build_session
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.robot.model import load_model
 
@@ -31,20 +26,8 @@ def test_only_narrow_joints_and_only_while_just_the_whole_tool_is_steered():
         assert not centring.weights(channels.mask(*names)).any(), names
 
 
-def test_an_arm_whose_joints_turn_around_is_left_alone():
-    model = load_model()
-    channels = Channels.of(model.description)
-    assert narrow_joint_centring(channels, model.description.limits, 10.0) == ()
-    entries = build_controller(MODES["ee"], model, 20).residuals.objectives  # pyright: ignore
-    assert [entry.name for entry in entries] == [
-        entry.name for entry in MaskedMpc(model).residuals.objectives
-    ]
-
-
 def test_a_hand_that_is_steered_to_a_far_pose_is_not_led_into_a_corner():
     """Left alone joints 2 and 6 end at their limits there, 0.4 m from the goal, and stay."""
-    config = SessionConfig(task="reach", robot="ridgeback_panda")
-    with closing(build_env(config, 20)) as env:
-        outcome = build_session(config, env).run(episode_seed(100, 3))
+    outcome = episode(episode_seed(100, 3), task="reach", robot="ridgeback_panda")
     assert outcome.success, outcome
     assert outcome.contact_onsets == 0
