@@ -2,7 +2,6 @@
 
 import importlib
 import re
-import tomllib
 import warnings
 from dataclasses import fields, is_dataclass
 from itertools import chain
@@ -13,7 +12,7 @@ import pytest
 from pages import BENCH_CONFIGS, COMMAND_CONFIGS, CONFIGS, DOCUMENTS, PAGES, RESULTS, commands, text
 from places import ROOT
 
-from handrail.collect.config import CAMERAS, RecordConfig, SessionConfig
+from handrail.collect.config import RecordConfig, SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_env, session_features
 from handrail.collect.session.perturbations import DEFAULTS
@@ -141,9 +140,3 @@ def test_a_table_s_first_column_is_complete(page, heading):
     rows = re.findall(r"^\| (`.*?) \|", section, re.MULTILINE)
     named = {name.split(" ")[0] for row in rows for name in re.findall("`(.*?)`", row)}
     assert named == TABLES[page, heading]()
-
-
-def test_cameras_and_the_version_are_told():
-    assert all(f"`{camera}`" in text("docs/recording.md") for camera in CAMERAS)
-    version = tomllib.loads(text("pyproject.toml"))["project"]["version"]
-    assert f"\n## {version}" in text("CHANGELOG.md")

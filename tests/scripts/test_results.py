@@ -51,21 +51,6 @@ def test_every_figure_of_a_page_is_one_of_its_numbers(page):
     assert figures == OTHERS.get(stem, set())
 
 
-def contrast(name: str, kind: str) -> tuple[list[str], str]:
-    """Return the sides of a contrast of the study's success over both tasks, and its points."""
-    study = NUMBERS["teleop_modes_factors"]
-    assert study["missing"] == []
-    (found,) = [
-        each
-        for each in study["contrasts"]
-        if (each["name"].split(":")[0], each["kind"], each["measure"]) == (name, kind, "success")
-        and len(each["tasks"]) == 2
-    ]
-    points = (found["estimate"]["value"], *found["estimate"]["interval"])
-    value, low, high = (f"{100 * each:+.0f}".replace("-", "−") for each in points)
-    return [f"{100 * side:.0f}" for side in found["sides"]], f"{value} ({low} to {high})"
-
-
 def plain(page: str) -> str:
     return " ".join(text(page).replace("**", "").split())
 
@@ -83,14 +68,6 @@ def test_the_first_table_of_goal_reaching_is_that_of_the_runs():
         assert f"| `{name}` | {' | '.join(cells)} | {touched} |" in page
         reached = sum(round(each["success"]["mean"] * each["episodes"]) for each in found)
         assert name not in ("mpc", "mink") or re.search(rf"(mpc|MPC|`mink`)\D* {reached}\b", readme)
-
-
-def test_direct_is_the_controller_that_dls_is():
-    """In everything that is measured but times and what it is called."""
-    for run in RUNS.values():
-        if "direct" in run["controllers"]:
-            one, other = (run["controllers"][name] for name in ("dls", "direct"))
-            assert all(one[metric] == other[metric] for metric in METRICS if metric != "wall_time_s")
 
 
 @pytest.mark.parametrize("name", RUNS)

@@ -68,6 +68,7 @@ def test_a_page_that_watches_moves_nothing_but_may_stop(served):
         while not told(second, "you")["driving"]:
             pass
         assert heard(served, {Kind.LOST})  # whoever drives anew lets go first
+        second.send(json.dumps({"kind": "ask", "what": "give", "value": True}))
 
 
 def test_a_slow_page_gets_what_is_newest(served):

@@ -10,7 +10,6 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.prediction import after
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model
 from handrail.scripts.bench.goal_reaching.baselines import (
     goal_reaching_prediction,
@@ -43,34 +42,10 @@ def test_a_baseline_s_low_pass_is_the_mpc_s():
         assert (sent.time, sent.mask.tolist()) == (time, CHANNELS.mask("ee").tolist())
 
 
-def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
-    for name in ("mink", "rl"):
-        bare, smooth = BASELINES[name], BASELINES[f"{name}_low_pass"]
-        assert resolved(smooth.operator) is smoothed_hand_intent
-        assert resolved(bare.operator) is hand_intent
-        own = {"name": bare.name, "help": bare.help, "operator": bare.operator, "lag": bare.lag}
-        assert replace(smooth, **own) == bare
-
-
 def test_the_low_pass_begins_at_rest_in_every_episode():
     who = replace(BASELINES["dls"], operator=smoothed_hand_intent)
     first, second = (trace_of(KEYS, who, 0)[1] for _ in range(2))
     np.testing.assert_array_equal(first.v, second.v)
-
-
-def test_the_paper_s_horizon_is_the_paper_s():
-    """N = 10, dt = 0.1 s, γ = 1, the command held constant, no posture and no terminal cost."""
-    baseline = BASELINES["mpc_paper"]
-    mpc = baseline.controller(MODEL)
-    assert isinstance(mpc, MaskedMpc)
-    assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.09)
-    intent = hand_intent(MODEL)(np.full(6, 0.1), STATE, 0.0)
-    problem = mpc.build_problem(STATE, intent)
-    tool = CHANNELS.tool_slice
-    np.testing.assert_allclose(problem.reference[:, tool], 0.1)
-    assert np.ptp(problem.weights, axis=0).max() == 0.0  # every stage alike, the last one too
-    np.testing.assert_allclose(problem.weights[:, tool], 1000.0)
-    assert (mpc.settings.posture, mpc.settings.terminal_velocity) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("name", ["mpc_paper", "mpc"])

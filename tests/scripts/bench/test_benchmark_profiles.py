@@ -71,27 +71,6 @@ def test_no_message_comes_before_it_is_sent_or_out_of_order(profile):
     assert delivered.min() >= NOTHING_YET
 
 
-def test_faster_is_shorter():
-    usual = commands(4, "nominal")
-    for profile, speed in SPEEDS.items():
-        fast = commands(4, profile)
-        assert abs(fast.end - usual.end / speed) <= 1
-        np.testing.assert_allclose(
-            np.linalg.norm(fast.twists[0]), speed * np.linalg.norm(usual.twists[0]), rtol=0.01
-        )
-
-
-def test_jerky_profiles_are_jerky():
-    """Each changes its twist far more often, or more, than the one that only starts and stops."""
-    change = {
-        profile: np.abs(np.diff(commands(5, profile).twists, axis=0)).sum()
-        for profile in ("nominal", "steps", "noise", "quantised")
-    }
-    assert all(change[profile] > 5 * change["nominal"] for profile in ("steps", "noise", "quantised"))
-    assert np.max(np.arange(T_MAX) - commands(5, "dropouts").delivered) * STEP > WATCHDOG
-    assert np.max(np.arange(T_MAX) - commands(5, "delay").delivered) * STEP < WATCHDOG
-
-
 @pytest.mark.parametrize("profile", PROFILES)
 def test_after_the_end_nothing_is_asked(profile):
     sent = commands(6, profile)

@@ -117,17 +117,6 @@ def test_the_robot_keeps_its_limits_whatever_the_policy_does(seed):
         assert np.allclose(env.q, before_q + 0.5 * STEP * (before_v + env.velocity))
 
 
-def test_physics_are_the_ideal_robot_s_but_for_the_servos():
-    """Law: the same actions lead to the same place within millimetres, and not exactly."""
-    one, other = GoalReachingEnv(early_failure=False), GoalReachingEnv(early_failure=False, physics=False)
-    for env in (one, other):
-        env.reset(seed=2)
-        for t in range(60):
-            env.step(np.array([np.sin(t / 20), 0.3, -0.2]))
-    assert np.allclose(one.q, other.q, atol=5e-3)
-    assert not np.allclose(one.q, other.q, atol=1e-9)
-
-
 def test_reward_is_the_paper_s():
     action, previous = np.array([0.5, 0.0, -1.0]), np.array([0.0, 1.0, -1.0])
     expected = -0.5 * (0.2**2 / 0.1**2 + 0.1**2 / 0.05**2) - 0.05 * 1.25 - 0.05 * 1.25
