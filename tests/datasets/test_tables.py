@@ -3,7 +3,6 @@
 import html
 import io
 
-import numpy as np
 import pytest
 from rich.console import Console
 
@@ -11,7 +10,6 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.markdown import markdown_table, with_part
 from handrail.datasets.presentation.markup import page, section
 from handrail.datasets.presentation.table import Cell, Table
-from handrail.datasets.statistics.resampling import difference_of_means, permutation_p
 
 TABLE = Table(
     ("who", "how much [m]"),
@@ -46,13 +44,3 @@ def test_a_part_is_replaced_between_either_kind_of_mark():
         assert new.endswith("\n\nafter\n")
     with pytest.raises(HandrailError, match="once each"):
         with_part("<!-- run -->\nold\n", "run", "new")
-
-
-def test_the_p_of_a_few_values_counts_every_permutation():
-    low, high = np.arange(4.0), np.arange(4.0) + 10.0
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        assert permutation_p((low, high), difference_of_means, False, rng) == pytest.approx(
-            2 / 70
-        )  # of 8 over 4
-        assert permutation_p((low, high), difference_of_means, True, rng) == pytest.approx(2 / 16)

@@ -57,11 +57,11 @@ def record_episodes(
     return root
 
 
-def part(root, first: int, end: int):
+def part(root, first: int, end: int, cameras: bool = False):
     """Record some of the episodes that `record` makes."""
-    with create(root) as writer:
+    with create(root, cameras) as writer:
         for _ in range(first, end):
-            record_one(writer, False, first)
+            record_one(writer, cameras, first)
     return root
 
 
