@@ -89,16 +89,7 @@ def heard(served, kinds, count=1, patience=60.0):
     """Return what reaches the recording of some kinds, as many as are wanted."""
     found, until = [], time.monotonic() + patience
     while len(found) < count and time.monotonic() < until:
-        found += [(kind, data) for kind, data in served.pipe.receive() if kind in kinds]
-        time.sleep(0.01)
-    return found
-
-
-def heard_by(served, kinds, count=1, patience=60.0):
-    """Return kinds of what the recording hears, by the process that looks after the server."""
-    found, until = [], time.monotonic() + patience
-    while len(found) < count and time.monotonic() < until:
-        found += [kind for kind, _ in served.receive() if kind in kinds]
+        found += [(kind, data) for kind, data in served.receive() if kind in kinds]
         time.sleep(0.01)
     return found
 

@@ -18,9 +18,9 @@ from handrail.scripts.bench.latency.measure import family
 _PERIOD = 0.05  # of a frame [s]
 
 
-def command(folder, *flags):
-    words = [sys.executable, "-m", "handrail.scripts", "cockpit", *([str(folder)] if folder else [])]
-    return [*words, "--cockpit.no_open", "--cockpit.port", "0", *map(str, flags)]
+def command(*words):
+    program = [sys.executable, "-m", "handrail.scripts", *map(str, words)]
+    return [*program, "--cockpit.no_open", "--cockpit.port", "0"]
 
 
 class Recording:
@@ -29,7 +29,7 @@ class Recording:
     def __init__(self, folder, *flags):
         self.root, self.log = folder / "dataset", folder / "log"
         with self.log.open("w") as log:
-            self.process = subprocess.Popen(command(self.root, *flags), stderr=log)
+            self.process = subprocess.Popen(command("cockpit", self.root, *flags), stderr=log)
         while "Drive at" not in self.log.read_text():
             assert self.process.poll() is None, self.log.read_text()
             time.sleep(0.1)
@@ -48,20 +48,27 @@ class Recording:
 
 
 @contextlib.contextmanager
-def recording(folder, *flags, cwd=None):
-    """Run `handrail-cockpit` for a folder, or with none; give its process and address."""
-    process = subprocess.Popen(command(folder, *flags), stderr=subprocess.PIPE, text=True, cwd=cwd)
+def started(*words, cwd=None):
+    """Run a command that opens a cockpit; give its process, its address and what it said before."""
+    process = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, cwd=cwd)
     try:
         said = []
         while "Drive at" not in (line := process.stderr.readline()):
             said.append(line)
             assert line, "".join(said)
-        yield process, line.split("Drive at ")[1].strip()
+        yield process, line.split("Drive at ")[1].strip(), "".join(said)
     finally:
         if process.poll() is None:
             process.send_signal(signal.SIGTERM)
         with contextlib.suppress(ValueError):  # a test has read it all
             process.communicate(timeout=60)
+
+
+@contextlib.contextmanager
+def recording(folder, *flags, cwd=None):
+    """Run `handrail-cockpit` for a folder, or with none; give its process and address."""
+    with started("cockpit", *([folder] if folder else []), *flags, cwd=cwd) as (process, address, _):
+        yield process, address
 
 
 @contextlib.contextmanager

@@ -1,8 +1,17 @@
-"""What the tests of the real page share: a cockpit on a bench, and its page."""
+"""What the tests of the cockpit share: a server without a robot, and a cockpit on a bench with its page."""
 
 from contextlib import ExitStack
 
 import pytest
+from cockpit_helpers import server, stage
+
+
+@pytest.fixture(scope="module")
+def served():
+    """A server whose recording has said what there is to draw."""
+    with server() as made:
+        stage(made)
+        yield made
 
 
 @pytest.fixture

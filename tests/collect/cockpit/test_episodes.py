@@ -6,21 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from cockpit_helpers import ask, server
+from collect_helpers import environment
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.episodes import EpisodeList, EpisodePoses
-from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.operator import EpisodeEvent
-from handrail.collect.session.build import build_env
 from handrail.collect.session.outcome import Tally
 
 
 @pytest.fixture
 def env():
-    made = build_env(RecordConfig(task="reach", dataset=DatasetConfig(place="somewhere")), 20)
-    made.reset(seed=3)
-    yield made
-    made.close()
+    with environment("Reach") as made:
+        made.reset(seed=3)
+        yield made
 
 
 def read(data, bodies):

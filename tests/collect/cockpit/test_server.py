@@ -7,20 +7,13 @@ from contextlib import suppress
 from urllib.parse import urlsplit
 
 import pytest
-from cockpit_helpers import ask, drive, heard, heard_by, page, seen, server, show, stage, told
+from cockpit_helpers import ask, drive, heard, page, seen, server, show, stage, told
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from handrail.collect.cockpit.page_socket import REPLACED
 from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import MOST_DEATHS
 from handrail.controllers.errors import HandrailError
-
-
-@pytest.fixture(scope="module")
-def served():
-    with server() as made:
-        stage(made)
-        yield made
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +27,7 @@ def guarded(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def quiet(request):
     if "served" in request.fixturenames:
-        request.getfixturevalue("served").pipe.receive()
+        request.getfixturevalue("served").receive()
     yield
     time.sleep(0.05)
 
@@ -183,7 +176,7 @@ def test_a_server_that_dies_is_started_again_at_its_address_and_a_session_outliv
         cookie = ask(made, "/login", address.split("#")[1].encode())[1]["set-cookie"].split(";")[0]
         made.process.kill()
         made.process.wait()
-        assert heard_by(made, {Kind.LOST, Kind.NOTE}, 2) == [Kind.LOST, Kind.NOTE]
+        assert [kind for kind, _ in heard(made, {Kind.LOST, Kind.NOTE}, 2)] == [Kind.LOST, Kind.NOTE]
         assert (made.address, len(said)) == (address, 1)
         assert made.process.pid != before
         stage(made)

@@ -1,12 +1,11 @@
 """A study through the real page: synthetic participants steer by keys and answer forms; one is killed."""
 
 import json
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import pytest
 from command_helpers import command
+from page_recording import started
 from participant_driver import REMARK, ParticipantDriver
 from playwright.sync_api import expect
 from user_study_helpers import study_folder
@@ -35,20 +34,9 @@ when = "end"
 @contextmanager
 def running(root, name):
     """Run a participant's session; give its process and address."""
-    words = [sys.executable, "-m", "handrail.scripts", "user-study", "run", str(root), name]
-    words += ["--cockpit.no_open", "--cockpit.port", "0"]
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    try:
-        said = []
-        while "Drive at" not in (line := process.stderr.readline()):
-            said.append(line)
-            assert line, "".join(said)
-        assert DEMO_NOTE in "".join(said)
-        yield process, line.split("Drive at ")[1].strip()
-    finally:
-        if process.poll() is None:
-            process.terminate()
-        process.communicate(timeout=60)
+    with started("user-study", "run", root, name) as (process, address, said):
+        assert DEMO_NOTE in said
+        yield process, address
 
 
 def half_a_form(driver):
