@@ -1,20 +1,6 @@
 """The baseline does what its environment and its network do; bad input brakes it, a bad file is refused."""
 
-
 import json
-
-import numpy as np
-import pytest
-from rl_helpers import random_actor
-
-from handrail.controllers.errors import HandrailError
-from handrail.policies.rl.observation import conditioning
-from handrail.policies.rl.policy import SHIPPED, Actor
-from handrail.scripts.bench.rl.env import FINAL_SEED, evaluate, evaluation_goals
-
-
-
-
 from dataclasses import replace
 
 import numpy as np
@@ -25,13 +11,16 @@ from handrail.collect.world.ideal_robot import IdealRobot
 from handrail.collect.world.plant import Gate
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.tasks.goal_reaching import STEP
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.controller import RlController
-from handrail.scripts.bench.rl.env import GoalReachingEnv
+from handrail.policies.rl.observation import conditioning
+from handrail.policies.rl.policy import SHIPPED, Actor
+from handrail.scripts.bench.rl.env import FINAL_SEED, GoalReachingEnv, evaluate, evaluation_goals
 
 MODEL = load_model()
 CHANNELS = Channels.of(MODEL.description)
