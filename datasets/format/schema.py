@@ -4,17 +4,17 @@ Keys that begin `observation` or `action` become inputs and outputs of a LeRobot
 anything else (`teleop.*`, `controller.*`, …) is kept beside them.
 """
 
-import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 from msgspec import Meta
 
+from handrail.controllers.arrays import are_finite
 from handrail.controllers.errors import HandrailError, shown
 
 NUMBERS = (
@@ -34,6 +34,7 @@ DTYPES = (*NUMBERS, "string", "video")
 POLICY_PREFIXES = ("observation", "action")
 OUTCOME_PREFIX = "next."  # LeRobot's name for what came of a frame
 _LARGEST = 10**8  # numbers a frame and feature
+_can_become = cache(np.can_cast)
 
 
 @dataclass(frozen=True)
@@ -146,14 +147,15 @@ def check_frame(frame: Mapping[str, Any], features: Mapping[str, Feature]) -> di
             `(1,)`; images are `(height, width, 3)` uint8; strings are `str`.
         features: The schema.
     """
-    missing = [key for key in features if key not in frame]
-    extra = [str(key) for key in frame if key not in features]
-    if missing or extra:
+    if frame.keys() != features.keys():
+        missing = [key for key in features if key not in frame]
+        extra = [str(key) for key in frame if key not in features]
         raise HandrailError(
             f"frame: expected the keys {', '.join(features)};"
             f" missing: {', '.join(missing) or 'none'}; unknown: {', '.join(extra) or 'none'}"
         )
-    return {key: _check_value(key, feature, frame[key]) for key, feature in features.items()}
+    with np.errstate(over="ignore"):
+        return {key: _check_value(key, feature, frame[key]) for key, feature in features.items()}
 
 
 def _check_value(key: str, feature: Feature, value: Any) -> Any:
@@ -164,16 +166,15 @@ def _check_value(key: str, feature: Feature, value: Any) -> Any:
     given, dtype = np.asarray(value), feature.number
     if given.shape != feature.shape and not (given.shape == () and feature.is_scalar):
         raise HandrailError(f"frame: {key!r} expected the shape {feature.shape}, got {given.shape}")
-    as_it_is = given.dtype == dtype
-    if not (as_it_is or np.can_cast(given.dtype, dtype, "equiv" if feature.is_video else "same_kind")):
+    as_it_is = given.dtype is dtype
+    if not (as_it_is or _can_become(given.dtype, dtype, "equiv" if feature.is_video else "same_kind")):
         raise HandrailError(f"frame: {key!r} expected {dtype}, got {given.dtype}")
     if feature.is_video:
         return given
-    with contextlib.nullcontext() if as_it_is else np.errstate(over="ignore"):
-        array = given.astype(dtype).reshape(feature.shape)
-    if dtype.kind in "iu" and not (as_it_is or np.array_equal(array.ravel(), given.ravel())):
+    array = given.astype(dtype).reshape(feature.shape)
+    if not as_it_is and dtype.kind in "iu" and not np.array_equal(array.ravel(), given.ravel()):
         raise HandrailError(f"frame: {key!r} expected values that fit {dtype}, got {given.tolist()}")
-    if key.startswith(POLICY_PREFIXES) and dtype.kind == "f" and not np.isfinite(array).all():
+    if key.startswith(POLICY_PREFIXES) and dtype.kind == "f" and not are_finite(array):
         where = int(np.flatnonzero(~np.isfinite(array))[0])
         name = feature.names[where] if feature.names else str(where)
         raise HandrailError(

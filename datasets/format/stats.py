@@ -112,30 +112,33 @@ def _many_rows_stats(rows: np.ndarray) -> Statistics:
     variance = np.mean(rows**2, axis=0) - mean**2
     stats = {"min": low, "max": high, "mean": mean, "std": np.sqrt(np.maximum(0, variance))}
     edges = np.linspace(low - 1e-10, high + 1e-10, BINS + 1)  # (BINS + 1, d)
-    quantiles = np.stack([_quantiles(*each) for each in zip(rows.T, edges.T, strict=True)], axis=1)
-    stats |= dict(zip(QUANTILES, quantiles, strict=True))
+    stats |= dict(zip(QUANTILES, _quantiles(rows, edges), strict=True))
     return {name: value.astype(np.float64) for name, value in stats.items()} | {
         "count": np.array([len(rows)])
     }
 
 
 def _quantiles(values: np.ndarray, edges: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
-    """Return the quantiles of a column, interpolated inside the first bin up to which enough values lie.
+    """Return quantiles of columns, (5, d), interpolated inside the first bin up to which enough values lie.
 
     In the first bin it is the lower edge, as LeRobot has it.
 
     Args:
-        values: `(N,)`.
-        edges: of the bins, `(BINS + 1,)`; the last bin is closed.
-        counts: How often each value occurs, `(N,)`; once without.
+        values: `(N, d)`; rising where they are counted.
+        edges: of the bins, `(BINS + 1, d)`; the last bin is closed.
+        counts: How often each row occurs, `(N,)`; once without.
     """
-    bins = np.minimum(np.searchsorted(edges, values, side="right"), BINS) - 1
-    counts = np.bincount(bins, counts, minlength=BINS)
+    pairs = zip(edges.T, values.T, strict=True)
+    above = np.stack([np.searchsorted(*each, side="right") for each in pairs], axis=1)
+    bins = np.sort(np.minimum(above, BINS) - 1, axis=0)
+    counts = np.ones(len(bins), dtype=int) if counts is None else counts
     ranks = np.cumsum(counts)
     targets = _SHARES * ranks[-1]
-    chosen = np.searchsorted(ranks, targets)
-    share = (targets - (ranks[chosen] - counts[chosen])) / counts[chosen]
-    return edges[chosen] + share * np.where(chosen > 0, edges[chosen + 1] - edges[chosen], 0.0)
+    chosen = bins[np.searchsorted(ranks, targets)]
+    before, upto = counts @ (bins < chosen[:, None]), counts @ (bins <= chosen[:, None])
+    share = (targets[:, None] - before) / (upto - before)
+    lower, upper = (np.take_along_axis(edges, chosen + more, axis=0) for more in (0, 1))
+    return lower + share * np.where(chosen > 0, upper - lower, 0.0)
 
 
 def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:
@@ -143,8 +146,9 @@ def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:
     total, present = counts.sum(), np.flatnonzero(counts)
     mean = counts @ _LEVELS / total
     low, high = np.float32(present[0]), np.float32(present[-1])
-    edges = np.linspace(low - 1e-10, high + 1e-10, BINS + 1)
-    quantiles = dict(zip(QUANTILES, _quantiles(_LEVELS[present], edges, counts[present]), strict=True))
+    edges = np.linspace(low - 1e-10, high + 1e-10, BINS + 1)[:, None]
+    found = _quantiles(_LEVELS[present, None], edges, counts[present])[:, 0]
+    quantiles = dict(zip(QUANTILES, found, strict=True))
     spread = np.sqrt(max(0.0, counts @ _LEVELS**2 / total - mean**2))
     return {"min": float(low), "max": float(high), "mean": mean, "std": spread, **quantiles}
 

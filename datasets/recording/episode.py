@@ -21,6 +21,7 @@ class OpenEpisode:
     def __init__(self, layout: Layout, manifest: Manifest):
         """Start an episode; the encoders start with the first frame."""
         self._manifest, self._staging = manifest, layout.staging
+        self._cameras = video_keys(manifest.features)
         self._frames: list[dict[str, Any]] = []
         self._encoders: dict[str, VideoEncoder] = {}
         self.tasks: list[str] = []
@@ -40,7 +41,7 @@ class OpenEpisode:
             raise HandrailError(f"task: expected a sentence, got {task!r}")
         features = self._manifest.features
         values = check_frame(frame, features)
-        for key in video_keys(features):
+        for key in self._cameras:
             if key not in self._encoders:
                 self._encoders[key] = VideoEncoder(self.staged_video(key), self._manifest.fps, features[key])
             self._encoders[key].add(values.pop(key))

@@ -16,6 +16,7 @@ from handrail.datasets.format.schema import Feature
 
 FARTHEST = 10.0  # [m] what a distance is cut to: nothing is nearer, there is nothing to measure, or no state
 MOST = 1e6  # [m/s, rad/s, …] what any other number is cut to
+_TRUE = np.array([True])
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ COLUMNS = (
     Column("observation.environment_state", "float32", lambda frame: frame.environment, "environment"),
     Column("action", "float32", lambda frame: frame.action, "velocities"),
     Column("teleop.values", "float32", lambda frame: _asked(frame.intent), "asked"),
-    Column("teleop.mask", "bool", lambda frame: np.append(frame.intent.mask, True), "asked"),
+    Column("teleop.mask", "bool", lambda frame: np.concatenate((frame.intent.mask, _TRUE)), "asked"),
     Column("teleop.mode", "string", lambda frame: frame.intent.mode),
     Column("teleop.raw", "float32", lambda frame: _raw(frame.intent), "channels"),
     Column("teleop.axes", "int64", lambda frame: frame.intent.raw.axes),
@@ -129,7 +130,7 @@ def frame_row(frame: Frame) -> dict[str, Any]:
 
 
 def _asked(intent: Intent) -> FloatArray:
-    return _finite(np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper))
+    return _finite(np.concatenate((np.where(intent.mask, intent.values, 0.0), (intent.gripper,))))
 
 
 def _raw(intent: Intent) -> FloatArray:
@@ -138,6 +139,8 @@ def _raw(intent: Intent) -> FloatArray:
 
 def _finite(numbers: FloatArray) -> FloatArray:
     """Return numbers cut to ±`MOST`; what is none becomes 0."""
+    if numbers.dot(numbers) <= MOST:  # all are
+        return numbers
     within = np.minimum(np.maximum(numbers, -MOST), MOST)
     return np.where(np.isnan(within), 0.0, within)
 
