@@ -170,6 +170,7 @@ int64_t stop_velocities(const double *velocity, int64_t n, const double *a_max, 
 /* rotation.c */
 int64_t quaternion_of(const double *rotation, double *quaternion);
 void vector_of(const double *quaternion, double *vector);
+int64_t rotation_vector_of(const double *rotation, double *vector);
 
 /* motion.c */
 void roll_out(const Core *c, const double *u, double *q, double *v);

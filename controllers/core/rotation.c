@@ -46,3 +46,11 @@ void vector_of(const double *q, double *out) {
   double scale = angle <= 1e-3 ? 2.0 + square / 12.0 + 7.0 * square * square / 2880.0 : angle / sin(angle / 2.0);
   for (int i = 0; i < 3; i++) out[i] = sign * scale * q[i];
 }
+
+/* The rotation vector of a rotation; return 0 where it is none. */
+int64_t rotation_vector_of(const double *R, double *out) {
+  double q[4];
+  if (!quaternion_of(R, q)) return 0;
+  vector_of(q, out);
+  return 1;
+}

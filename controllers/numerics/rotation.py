@@ -4,11 +4,15 @@ What is asked many times in a control period is in the compiled core: for
 one matrix SciPy's own functions take most of their time to check it.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.core.library import functions
+
+_NO_TURN = np.eye(3)
 
 
 def turned(planar: ArrayLike, angle: ArrayLike) -> FloatArray:
@@ -56,8 +60,8 @@ def quaternion_from_matrix(matrix: ArrayLike) -> FloatArray:
 def matrix_from_quaternion(quaternion: ArrayLike) -> FloatArray:
     """Return the rotation matrix of a quaternion (w, x, y, z), (3, 3): `I + 2 w [r]× + 2 [r]×²`, |q| = 1."""
     w, *r = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
-    cross = np.cross(np.eye(3), r)
-    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+    cross = _cross_matrix(*r)
+    return _NO_TURN + 2.0 * w * cross + 2.0 * cross @ cross
 
 
 def matrix_from_vector(vector: ArrayLike) -> FloatArray:
@@ -66,15 +70,22 @@ def matrix_from_vector(vector: ArrayLike) -> FloatArray:
     `I + sin θ / θ [θ a]× + (1 − cos θ) / θ² [θ a]×²`.
     """
     turn = np.asarray(vector, dtype=float)
-    share, cross = np.linalg.norm(turn) / np.pi, np.cross(np.eye(3), turn)
-    return np.eye(3) + np.sinc(share) * cross + 0.5 * np.sinc(0.5 * share) ** 2 * cross @ cross
+    angle, cross = math.pi * (math.sqrt(turn.dot(turn)) / math.pi or 1e-20), _cross_matrix(*turn.tolist())
+    half = math.sin(0.5 * angle) / (0.5 * angle)
+    return _NO_TURN + math.sin(angle) / angle * cross + 0.5 * half**2 * cross @ cross
 
 
 def rotation_vector(matrix: ArrayLike) -> FloatArray:
     """Return the rotation vector (axis times angle) [rad] of a rotation matrix, (3,)."""
-    vector = np.empty(3)
-    functions().vector_of(_quaternion(matrix), vector)
+    given, vector = np.ascontiguousarray(matrix, dtype=float), np.empty(3)
+    if not (given.shape == (3, 3) and functions().rotation_vector_of(given, vector)):
+        functions().vector_of(_quaternion(given), vector)
     return vector
+
+
+def _cross_matrix(x: float, y: float, z: float) -> FloatArray:
+    """Return `[r]×`, (3, 3): `[r]× s = r × s`."""
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _quaternion(matrix: ArrayLike) -> FloatArray:

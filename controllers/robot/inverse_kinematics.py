@@ -38,17 +38,18 @@ def body_configuration(
 def _configuration(
     model: RobotModel, q: FloatArray, goal: Pose, tolerance: float, moving: slice
 ) -> tuple[FloatArray, float]:
-    q, limits = np.array(q, dtype=float), model.description.limits
+    q, limits, damping = np.array(q, dtype=float), model.description.limits, _DAMPING * np.eye(6)
+    lower, upper = limits.position_lower[moving], limits.position_upper[moving]
     error = pose_error(model.pose(q), goal)
     for _ in range(_STEPS):
-        if np.max(np.abs(error)) < tolerance:
+        if np.abs(error).max() < tolerance:
             break
         jacobian = model.jacobian(q)[:, moving]
-        step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + _DAMPING * np.eye(6), error)
-        moved = q[moving] + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
-        q[moving] = np.clip(moved, limits.position_lower[moving], limits.position_upper[moving])
+        step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping, error)
+        moved = q[moving] + np.minimum(np.maximum(step, -_LARGEST_STEP), _LARGEST_STEP)
+        q[moving] = np.minimum(np.maximum(moved, lower), upper)
         error = pose_error(model.pose(q), goal)
-    return q, float(np.max(np.abs(error)))
+    return q, float(np.abs(error).max())
 
 
 def pose_error(tool: Pose, goal: Pose) -> FloatArray:

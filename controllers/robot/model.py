@@ -21,7 +21,7 @@ _AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pose:
     """Position [m], (3,), and rotation world from frame, (3, 3)."""
 
@@ -43,7 +43,7 @@ class RobotModel:
         self.pinocchio = _build(description)
         self.size = self.pinocchio.nv
         self._data = self.pinocchio.createData()
-        self._tool = self.frame_id("tool")
+        self._frames = {frame.name: self.pinocchio.getFrameId(frame.name) for frame in self.pinocchio.frames}
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -52,10 +52,10 @@ class RobotModel:
 
     def frame_id(self, frame: str) -> int:
         """Return pinocchio's index of a frame."""
-        if not self.pinocchio.existFrame(frame):
-            names = ", ".join(f.name for f in self.pinocchio.frames)
+        if frame not in self._frames:
+            names = ", ".join(self._frames)
             raise HandrailError(f"frame {frame!r} of robot {self.description.name}: expected one of {names}")
-        return self.pinocchio.getFrameId(frame)
+        return self._frames[frame]
 
     def mount(self, placed: PlacedShape) -> tuple[int, pin.SE3]:
         """Return the joint that carries a shape, and where the shape is on it."""

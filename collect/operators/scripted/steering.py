@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from handrail.collect.operators.modes import Focus
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.numerics.rotation import rotation_vector, turned
 from handrail.controllers.robot.model import Pose
 from handrail.controllers.robot.parts import WorldScale
@@ -102,10 +103,11 @@ def hand_twist(tool: Pose, goal: Pose, gains: Gains, pace: float = 1.0) -> Float
     return np.concatenate(speeds)
 
 
+@lru_cache(maxsize=1)
 def hand_errors(tool: Pose, goal: Pose) -> FloatArray:
     """Return how far the hand has to go, `p_goal - p` [m], and to turn, `log(R_goal Rᵀ)` [rad], (6,)."""
     turn = rotation_vector(goal.rotation @ tool.rotation.T)
-    return np.concatenate([goal.position - tool.position, turn])
+    return frozen(np.concatenate([goal.position - tool.position, turn]))
 
 
 def pose_errors(tool: Pose, goal: Pose) -> tuple[float, float]:
