@@ -1,5 +1,6 @@
 """The human-like eye and hand: misjudgement, delay, intermittency, minimum jerk, noise, drift."""
 
+import math
 from collections import deque
 from dataclasses import replace
 
@@ -31,9 +32,9 @@ class Wander:
     def at(self, time: float) -> FloatArray:
         """Return x at a time that is not before the last one [s]."""
         if self._time is not None and self._correlation > 0:
-            keep = np.exp(-(time - self._time) / self._correlation)
+            keep = math.exp(-(time - self._time) / self._correlation)
             fresh = self._rng.standard_normal(self._value.shape)
-            self._value = keep * self._value + np.sqrt(1.0 - keep**2) * fresh
+            self._value = keep * self._value + math.sqrt(1.0 - keep**2) * fresh
         self._time = time
         return self._value
 
@@ -102,9 +103,10 @@ class HumanHand:
         self._correct(self._delayed(wanted, time), time)
         noise, drift = self._wander.at(time)
         settings, held = self._settings, self._position(time)
-        touched = np.abs(held) > 0
-        moved = held + settings.noise * np.abs(held) * noise + settings.drift * self._fine * drift * touched
-        return np.clip(moved, -self._full, self._full) if settings.noise or settings.drift else moved
+        size = np.abs(held)
+        moved = held + settings.noise * size * noise + settings.drift * self._fine * drift * (size > 0)
+        within = np.minimum(np.maximum(moved, -self._full), self._full)
+        return within if settings.noise or settings.drift else moved
 
     def _delayed(self, wanted: FloatArray, time: float) -> FloatArray:
         seen, latest = self._seen, time - self._settings.delay + _JUST
@@ -115,16 +117,16 @@ class HumanHand:
 
     def _correct(self, wanted: FloatArray, time: float) -> None:
         """Begin a movement if there is reason to, and it may begin."""
-        refractory, released = self._settings.refractory, not np.any(wanted)
-        change = np.max(np.abs(wanted - self._held) / self._fine)
+        refractory, released = self._settings.refractory, not wanted.any()
+        change = (np.abs(wanted - self._held) / self._fine).max()
         may = change > self._settings.threshold and time - self._moved >= refractory - _JUST
-        if (released or may or not refractory) and not np.array_equal(wanted, self._held):
+        if (released or may or not refractory) and (wanted != self._held).any():
             self._left = np.zeros_like(self._held) if released else self._position(time)
             self._held, self._moved = wanted, time
 
     def _position(self, time: float) -> FloatArray:
         """Return where the hand is on its way, without noise, (k,)."""
-        if not np.isfinite(self._moved) or not self._settings.movement:
+        if not math.isfinite(self._moved) or not self._settings.movement:
             return self._held
         share = minimum_jerk((time - self._moved) / self._settings.movement)
         return self._left + share * (self._held - self._left)

@@ -146,7 +146,7 @@ class StickMap(InputMap):
         values[self.channels.tool_slice] = goal.hand
         if mask[self.channels.joint_slice].any():
             values[self.channels.joint_slice] = self._joint_velocities(goal, state.q)
-        return mask, np.clip(np.where(mask, values, 0.0), -self.full, self.full)
+        return mask, np.minimum(np.maximum(np.where(mask, values, 0.0), -self.full), self.full)
 
     def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return what the expert makes of a goal on all joints, (n,), within full stick."""

@@ -110,7 +110,7 @@ class ScriptedOperator:
 
     def _switch(self, mask: BoolArray, time: float) -> None:
         """Take the hand off the input for a moment when it acts on other channels from now on."""
-        if self._mask is not None and not np.array_equal(mask, self._mask):
+        if self._mask is not None and mask is not self._mask and (mask != self._mask).any():
             self._switches += 1
             self.free_at = time + self._settings.switch_time
         self._mask = mask

@@ -119,11 +119,11 @@ def pose_errors(tool: Pose, goal: Pose) -> tuple[float, float]:
 def base_errors(q: FloatArray, goal: FloatArray) -> FloatArray:
     """Return how far the base has to go to (x, y, θ), and to turn the shorter way, in the world, (3,)."""
     turn = goal[2] - q[2]
-    return np.array([*(goal[:2] - q[:2]), np.arctan2(np.sin(turn), np.cos(turn))])
+    return np.array([*(goal[:2] - q[:2]), math.atan2(math.sin(turn), math.cos(turn))])
 
 
 def base_twist(q: FloatArray, goal: FloatArray, gains: Gains) -> FloatArray:
     """Return the twist that drives the base to (x, y, θ), in the base frame, (3,)."""
     *way, turn = gains.gain * base_errors(q, goal)
-    rate = np.clip(turn, -gains.base_rate, gains.base_rate)
+    rate = min(max(turn, -gains.base_rate), gains.base_rate)
     return turned([*saturated(np.array(way), gains.base_speed), rate], -q[2])
