@@ -202,7 +202,7 @@ class EpisodeLoop:
             now.asked, now.due = step, now.due + self.control_period
             self.tally.updated(now.command)
         time = (step + 1 - now.asked) * self.env.period
-        return np.append(now.command.velocity(time), now.command.gripper)
+        return np.concatenate((now.command.velocity(time), (now.command.gripper,)))
 
     @property
     def _holds(self) -> bool:

@@ -6,7 +6,7 @@ from handrail.collect.world.geometry import ROBOT_BIT
 from handrail.collect.world.gl import MjData, MjModel
 from handrail.collect.world.gripper import FINGERS
 from handrail.collect.world.scene import Scene
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 
 _ROBOT, _GRASP, _MOVABLE = 1, 2, 3  # kinds of geoms; 0 is the scene
 
@@ -63,17 +63,20 @@ class Contacts:
         """Return the names of what is held at this instant."""
         if not (self._fingers and self._portable and data.ncon):
             return ()
-        left, right = (self._pushes(data, finger) for finger in self._fingers)
+        touching = data.contact.geom
+        if not all((touching == finger).any() for finger in self._fingers):
+            return ()
+        left, right = (self._pushes(touching, data.contact.frame, finger) for finger in self._fingers)
         return tuple(
             name
             for body, name in self._portable.items()
             if body in left and body in right and left[body] @ right[body] < 0.0
         )
 
-    def _pushes(self, data: MjData, finger: int) -> dict[int, FloatArray]:
+    def _pushes(self, touching: IntArray, frames: FloatArray, finger: int) -> dict[int, FloatArray]:
         """Return which way a finger pushes what it touches: sums of unit normals, (3,), by body."""
         pushes: dict[int, FloatArray] = {}
-        for pair, frame in zip(data.contact.geom, data.contact.frame, strict=True):
+        for pair, frame in zip(touching.tolist(), frames, strict=True):
             if finger in pair:
                 other, sign = (pair[1], 1.0) if pair[0] == finger else (pair[0], -1.0)
                 body = int(self._model.geom_bodyid[other])

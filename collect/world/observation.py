@@ -77,6 +77,8 @@ class AgentObservation:
 
 def bounded(numbers: FloatArray) -> NDArray[np.float32]:
     """Return the numbers as float32 within the space's bounds."""
+    if numbers.dot(numbers) <= _BOUND:  # they are
+        return numbers.astype(np.float32)
     within = np.minimum(np.maximum(numbers, -_BOUND), _BOUND)
     return np.where(np.isnan(within), 0.0, within).astype(np.float32)
 

@@ -138,12 +138,13 @@ class Gate:
             command: velocities [m/s, rad/s] and gripper, (n + 1,).
             q: where the robot is, (n,).
         """
-        *target, gripper = np.asarray(command, dtype=np.float64).ravel().tolist() or [math.nan]
-        usable = len(target) == len(self.velocity) and math.isfinite(gripper)
+        said, n = np.asarray(command, dtype=np.float64).ravel(), len(self.velocity)
+        usable = len(said) == n + 1 and math.isfinite(said[n])
         if usable:
-            self.gripper = min(max(gripper, 0.0), 1.0)
-        velocity, _ = self._limiter.limit(self.velocity, np.array(target if usable else ()), self._period, q)
-        sent = np.append(velocity, self.gripper).astype(self._precision)
+            self.gripper = min(max(float(said[n]), 0.0), 1.0)
+        velocity, _ = self._limiter.limit(self.velocity, said[: n if usable else 0], self._period, q)
+        sent = np.empty(n + 1, self._precision)
+        sent[:n], sent[n] = velocity, self.gripper
         self.velocity = sent[:-1].astype(np.float64)
         return sent
 

@@ -22,7 +22,7 @@ from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _TIMESTEP = 0.002  # [s]
-_UNSTABLE = [int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{number}")) for number in ("QACC", "QVEL", "QPOS")]
+_UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
 
 class Simulation(Plant):
@@ -81,6 +81,8 @@ class Simulation(Plant):
             self.data.qpos[self._finger_index] = apart / len(self._finger_index)
             self.data.ctrl[self._gripper_servo] = self._gripper_target(float(grip is not None))
         mujoco.mj_forward(self.mujoco_model, self.data)
+        self._standing = {item.name: self._pose(item.name) for item in scene.objects}
+        self._moving = [item.name for item in scene.objects if item.movable or item.patrol]
 
     def _find(self) -> None:
         """Find where the robot and what moves by itself are in MuJoCo's arrays."""
@@ -122,15 +124,16 @@ class Simulation(Plant):
         contacts.clear()
         before = self._gate.velocity
         sent = self._gate.limit(command, data.qpos[self._q_index])
-        ramp = np.empty((len(self._shares), len(data.ctrl)))
-        ramp[:, self._servo_index] = np.outer(1.0 - self._shares, before)
-        ramp[:, self._servo_index] += np.outer(self._shares, self._gate.velocity)
+        ctrl, shares = data.ctrl, self._shares[:, None]
+        ramp = np.empty((len(shares), len(ctrl)))
+        ramp[:, self._servo_index] = (1.0 - shares) * before + shares * self._gate.velocity
         if self._gripper:
-            now, reach = data.ctrl[self._gripper_servo], self._reach
+            now, reach = ctrl[self._gripper_servo], self._reach
             way = self._gripper_target(float(sent[-1])) - now
             ramp[:, self._gripper_servo] = now + np.minimum(np.maximum(way, -reach), reach)
-        for data.ctrl[:] in ramp:
-            self._move_obstacles()
+        for ctrl[:] in ramp:
+            if self._patrols:
+                self._move_obstacles()
             mujoco.mj_step(model, data)
             if data.ncon:
                 contacts.look(data)
@@ -185,6 +188,11 @@ class Simulation(Plant):
         return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self._gate.velocity)
 
     @property
+    def time(self) -> float:
+        """Since the episode began [s]."""
+        return self.data.time
+
+    @property
     def tool(self) -> Pose:
         """The pose of the tool point."""
         return _pose(self.data.site_xpos[self._tool], self.data.site_xmat[self._tool])
@@ -194,7 +202,7 @@ class Simulation(Plant):
         """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
         if self._gripper is None:
             return float(self._model.description.end_effector.gripper is not None)
-        return float(np.clip(self.data.qpos[self._finger_index].sum() / self._travel, 0.0, 1.0))
+        return min(max(float(self.data.qpos[self._finger_index].sum() / self._travel), 0.0), 1.0)
 
     @property
     def is_stable(self) -> bool:
@@ -203,19 +211,18 @@ class Simulation(Plant):
 
     def poses(self) -> dict[str, Pose]:
         """Return where every scene object is now, by name."""
-        return {item.name: self._pose(item.name) for item in self._scene.objects}
+        return self._standing | {name: self._pose(name) for name in self._moving}
 
     def still(self) -> frozenset[str]:
         """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
-        norm = np.linalg.norm  # of v; of ω, of which what slides has none
-        speeds = self._speeds.items()
-        return frozenset(name for name, v in speeds if norm(v[:3]) < 0.02 and norm(v[3:]) < 0.2)
+        speeds = ((name, v[:3], v[3:]) for name, v in self._speeds.items())  # w is ω, none of what slides
+        return frozenset(name for name, v, w in speeds if v.dot(v) < 0.02**2 and w.dot(w) < 0.2**2)
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""
         if self._held_at != self.data.time:
-            tool, names = self.tool, self._contacts.held(self.data)
-            self._held = tuple(self._scene.find(name).carried(tool, self._pose(name)) for name in names)
+            names = self._contacts.held(self.data)
+            self._held = tuple(self._scene.find(name).carried(self.tool, self._pose(name)) for name in names)
             self._held_at = self.data.time
         return self._held
 
