@@ -19,6 +19,7 @@ _FIRST, _PAUSE = (0.5, 2.0), (2.5, 5.0)  # when the first comes, and from one to
 _DURATION = (0.15, 0.25)  # [s]
 _BASE_EXCESS = 0.4  # force on the base over what its servos hold, a share of it
 _HAND_HELD, _HAND_EXCESS = 0.30, 0.25  # force on the hand over the arm's largest torque [1/m]
+_ROUNDING = 1e-9  # of the distance of what the hand holds, which comes along [m]
 _START_CLEARANCE = 0.08  # of the start from everything, unless it was nearer before [m]
 _ATTEMPTS = 100
 
@@ -137,7 +138,7 @@ def sample_shifted(task: Task, size: float, model: RobotModel, rng: np.random.Ge
         rng: drawn from.
     """
     start = task.sample(model, rng)
-    least = np.minimum(_distances(model, start), _START_CLEARANCE)
+    least = np.minimum(_distances(model, start), _START_CLEARANCE) - _ROUNDING
     for attempt in range(_ATTEMPTS):
         step = _draw(len(model.description.base.joints), model.size, size * (1.0 - attempt / _ATTEMPTS), rng)
         moved = _moved(model, start, step)

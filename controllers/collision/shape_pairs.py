@@ -9,9 +9,8 @@ import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
 from handrail.controllers.collision.motion_bounds import motion_bounds
-from handrail.controllers.core.library import Memory, constant
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.model import RobotModel, joints_of
+from handrail.controllers.robot.model import RobotModel, joint_memory
 from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes, scene_shapes
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -60,13 +59,7 @@ class ShapePairs:
         }
         held = (row for obstacle in obstacles if obstacle.held for row in self.rows[obstacle.name])
         self.held = np.array(list(held), dtype=int)
-        sizes = {"n": model.size, "S": len(self._index), "P": len(self.names)}
-        if model.size > (most := int(constant("MOST_COORDINATES"))):
-            raise HandrailError(
-                f"robot {description.name}: expected {most} coordinates at most, got {model.size}"
-            )
-        self.memory = Memory("Scene", sizes)
-        self._take_joints()
+        self.memory = joint_memory(model, len(self._index), len(self.names))
         self._take_shapes()
         self._take_pairs()
         self.memory.call_back("measure", self._measure)
@@ -122,15 +115,6 @@ class ShapePairs:
             *((name, thing) for thing in held for name in own),
             *((thing, other) for thing in held for other in around),
         ]
-
-    def _take_joints(self) -> None:
-        memory, limits = self.memory, self._model.description.limits
-        memory.lower[:], memory.upper[:] = limits.position_lower, limits.position_upper
-        memory.a_max[:] = limits.acceleration
-        for index, joint in enumerate(joints_of(self._model)):
-            memory.parent[index], memory.slides[index] = joint.parent, joint.prismatic
-            memory.joint_rotation[index] = joint.rotation.ravel()
-            memory.joint_position[index], memory.joint_axis[index] = joint.translation, joint.axis
 
     def _take_shapes(self) -> None:
         memory = self.memory

@@ -167,7 +167,12 @@ void mean_accelerations(const double *velocities, int64_t count, int64_t n, doub
                         double *out);
 int64_t stop_velocities(const double *velocity, int64_t n, const double *a_max, double dt, int64_t room, double *out);
 
+/* kinematics.c */
+double bring_tool(Scene *scene, const double *rotation, const double *position, int64_t first, double tolerance,
+                  double *q);
+
 /* rotation.c */
+void nearest_quaternion(const double *rotation, double *quaternion);
 int64_t quaternion_of(const double *rotation, double *quaternion);
 void vector_of(const double *quaternion, double *vector);
 int64_t rotation_vector_of(const double *rotation, double *vector);

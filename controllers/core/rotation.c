@@ -14,11 +14,10 @@ static int is_rotation(const double *R) {
   return dot3(third, R + 6) > 0.0;
 }
 
-/* Write (x, y, z, w) by way of the largest entry (F. Markley 2008); return 0 where it is no rotation. */
-int64_t quaternion_of(const double *R, double *q) {
+/* Write (x, y, z, w) of a matrix that is near to a rotation, by way of the largest entry (F. Markley 2008). */
+void nearest_quaternion(const double *R, double *q) {
   double trace = R[0] + R[4] + R[8];
   int i = 0;
-  if (!is_rotation(R)) return 0;
   for (int k = 1; k < 3; k++)
     if (R[4 * k] > R[4 * i]) i = k;
   if (trace > R[4 * i]) {
@@ -35,6 +34,12 @@ int64_t quaternion_of(const double *R, double *q) {
   }
   double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   for (int k = 0; k < 4; k++) q[k] /= norm;
+}
+
+/* The same; return 0 where it is no rotation. */
+int64_t quaternion_of(const double *R, double *q) {
+  if (!is_rotation(R)) return 0;
+  nearest_quaternion(R, q);
   return 1;
 }
 

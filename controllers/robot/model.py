@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.core.library import Memory, constant
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.robot.description import RobotDescription, load_description
 from handrail.controllers.robot.parts import PlacedShape, Placement
@@ -89,6 +90,22 @@ class Joint(NamedTuple):
 def joints_of(model: RobotModel) -> tuple[Joint, ...]:
     """Return the joints, one a coordinate."""
     return tuple(_joint(model, number) for number in range(1, model.pinocchio.njoints))
+
+
+def joint_memory(model: RobotModel, shapes: int, pairs: int) -> Memory:
+    """Return the compiled core's `Scene` of so many shapes and pairs, with the joints in it."""
+    memory, limits = Memory("Scene", {"n": model.size, "S": shapes, "P": pairs}), model.description.limits
+    if model.size > (most := int(constant("MOST_COORDINATES"))):
+        raise HandrailError(
+            f"robot {model.description.name}: expected {most} coordinates at most, got {model.size}"
+        )
+    memory.lower[:], memory.upper[:] = limits.position_lower, limits.position_upper
+    memory.a_max[:] = limits.acceleration
+    for index, joint in enumerate(joints_of(model)):
+        memory.parent[index], memory.slides[index] = joint.parent, joint.prismatic
+        memory.joint_rotation[index] = joint.rotation.ravel()
+        memory.joint_position[index], memory.joint_axis[index] = joint.translation, joint.axis
+    return memory
 
 
 def _joint(model: RobotModel, number: int) -> Joint:
