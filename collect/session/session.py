@@ -57,7 +57,7 @@ class Sampling:
             self._open = frame
             return None
         self._open, self.number = None, self.number + 1
-        return replace(frame, number=self.number - 1)
+        return frame if frame.number == self.number - 1 else replace(frame, number=self.number - 1)
 
 
 class Undo:
