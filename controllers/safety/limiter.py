@@ -43,11 +43,11 @@ class Limiter:
         valid = target.shape == previous.shape and bool(np.all(np.isfinite(target)))
         wanted = target if valid else np.zeros_like(previous)
         maximum = self.limits.velocity
-        allowed = np.clip(wanted, -maximum, maximum)
+        allowed = _within(wanted, -maximum, maximum)
         if q is not None:
-            allowed = np.clip(allowed, *self._braking_range(q))
+            allowed = _within(allowed, *self._braking_range(q))
         step = self.limits.acceleration * duration
-        allowed = np.clip(allowed, previous - step, previous + step)
+        allowed = _within(allowed, previous - step, previous + step)
         tolerance = _TOLERANCE * (maximum + step)
         return allowed, not valid or bool(np.any(np.abs(allowed - wanted) > tolerance))
 
@@ -71,3 +71,8 @@ class Limiter:
         below = np.maximum(q - self.limits.position_lower, 0.0)
         twice = 2.0 * self.limits.acceleration
         return -np.sqrt(twice * below), np.sqrt(twice * above)
+
+
+def _within(values: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """Return `min(max(v, lower), upper)`; NumPy's clip takes twice as long for so few."""
+    return np.minimum(np.maximum(values, lower), upper)
