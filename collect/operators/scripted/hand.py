@@ -2,12 +2,11 @@
 
 import math
 from collections import deque
-from dataclasses import replace
 
 import numpy as np
 
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.scripted.steering import MotionGoal, hand_errors, length
+from handrail.collect.operators.scripted.steering import MotionGoal, Target, hand_errors, length
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_vector
 from handrail.controllers.robot.model import Pose
@@ -64,14 +63,18 @@ class Perception:
         if target is not None:
             way = _off(hand_errors(tool, target.hand), hand, 3)
             seen = Pose(tool.position + way[:3], matrix_from_vector(way[3:]) @ tool.rotation)
-            target = replace(target, hand=seen, meant=target.hand)
-        return replace(goal, hand=_off(goal.hand, hand, 3), base=_off(goal.base, base, 2), target=target)
+            target = Target(
+                seen, target.base, target.distance, target.angle, target.pace, target.tilt, target.hand
+            )
+        hand, base = _off(goal.hand, hand, 3), _off(goal.base, base, 2)
+        return MotionGoal(hand, base, goal.focus, goal.gripper, target)
 
 
 def _off(vector: FloatArray, share: FloatArray, lengths: int) -> FloatArray:
     """Return a way and a turn that are misjudged by shares of their norms; the way has so many numbers."""
-    parts = ((vector[part], share[part]) for part in (slice(lengths), slice(lengths, None)))
-    return np.concatenate([part + length(part) * off for part, off in parts])
+    sizes = np.empty(len(vector))
+    sizes[:lengths], sizes[lengths:] = length(vector[:lengths]), length(vector[lengths:])
+    return vector + sizes * share
 
 
 class HumanHand:
