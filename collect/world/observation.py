@@ -1,13 +1,14 @@
 """An environment as numbers: the robot's part of the observation, and the obstacles."""
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
@@ -37,9 +38,10 @@ def pose_names(thing: str) -> tuple[str, ...]:
     return names_of(thing, ("x", "y", "z", "qw", "qx", "qy", "qz"))
 
 
+@lru_cache(maxsize=8)
 def pose_numbers(pose: Pose) -> FloatArray:
     """Return position and quaternion, (7,)."""
-    return np.concatenate([pose.position, quaternion_from_matrix(pose.rotation)])
+    return frozen(np.concatenate([pose.position, quaternion_from_matrix(pose.rotation)]))
 
 
 def row_names(thing: str, count: int, quantities: tuple[str, ...]) -> tuple[str, ...]:
@@ -69,10 +71,9 @@ class AgentObservation:
 
     def read(self, state: State, tool: Pose, opening: float) -> NDArray[np.float32]:
         """Return the numbers, in the order of `names`."""
-        pose = pose_numbers(tool)
-        if pose[3:] @ self._home < 0:
-            pose[3:] = -pose[3:]
-        return bounded(np.concatenate((state.q, state.v, [opening], pose)))
+        place, turn = (pose_numbers(tool)[part] for part in (slice(3), slice(3, None)))
+        turn = -turn if turn @ self._home < 0 else turn
+        return bounded(np.concatenate((state.q, state.v, [opening], place, turn)))
 
 
 def bounded(numbers: FloatArray) -> NDArray[np.float32]:

@@ -34,6 +34,7 @@ DTYPES = (*NUMBERS, "string", "video")
 POLICY_PREFIXES = ("observation", "action")
 OUTCOME_PREFIX = "next."  # LeRobot's name for what came of a frame
 _LARGEST = 10**8  # numbers a frame and feature
+_LARGE = 1e38  # what float32 holds
 _can_become = cache(np.can_cast)
 
 
@@ -163,7 +164,10 @@ def _check_value(key: str, feature: Feature, value: Any) -> Any:
         if not isinstance(value, str):
             raise HandrailError(f"frame: {key!r} expected a str, got {type(value).__name__}")
         return str(value)
-    given, dtype = np.asarray(value), feature.number
+    dtype = feature.number
+    if type(value) is float and feature.is_scalar and dtype.kind == "f" and abs(value) < _LARGE:
+        return np.array([value], dtype)
+    given = np.asarray(value)
     if given.shape != feature.shape and not (given.shape == () and feature.is_scalar):
         raise HandrailError(f"frame: {key!r} expected the shape {feature.shape}, got {given.shape}")
     as_it_is = given.dtype is dtype
