@@ -15,7 +15,7 @@ from handrail.controllers.ocp.residuals import StageResiduals
 
 NOTHING_ACTIVE = np.arange(SLACKS)  # only the slacks are at rest: none is negative
 _PHASES = ("distances", "residuals", "solve")
-_WORK = 3e7  # of all QPs of an update, counted as core/active_set.c does: some 20 ms
+_WORK = 2e4  # of all QPs of an update for each variable, counted as core/active_set.c does
 
 
 class RealTimeSolver:
@@ -48,7 +48,7 @@ class RealTimeSolver:
         """
         core = self._asked(problem, guess)
         core.active[: len(active)] = active
-        core.fields.active_rows, core.fields.work = len(active), _WORK
+        core.fields.active_rows, core.fields.work = len(active), _WORK * core.fields.M
         functions().solve_update(core, problem.collision.memory)
         problem.collision.check()
         slacks = core.slacks.tolist()
