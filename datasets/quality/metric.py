@@ -20,6 +20,11 @@ class Metric(Measure):
     of_dataset: bool = False
     """Whether an episode's value depends on the others, on their number and on neighbours that they share."""
 
+    @property
+    def help(self) -> str:
+        """Its meaning."""
+        return self.meaning
+
 
 def metric(
     unit: str = "", good: str = "", needs: Needs = "", title: str = "", of_dataset: bool = False

@@ -1,6 +1,9 @@
 """What another package adds is recorded, replayed, trained on and evaluated; no file makes it be imported."""
 
 import json
+import os
+import shutil
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -18,6 +21,14 @@ NAMED = {
     flag: f"press_kit:{entry}"
     for flag, entry in {"--task": "PRESS", "--mode": "HAND", "--operator": "EXACT", "--robot": "TWIN"}.items()
 }
+METRIC = '''
+from handrail.datasets.quality.metric import metric
+
+@metric("s", "lower")
+def presses(episode, scale):
+    """How long the press took."""
+    return episode.seconds
+'''
 SAID = [word for pair in NAMED.items() for word in pair]
 
 
@@ -55,11 +66,16 @@ def unseen(monkeypatch):
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
     """A package that is installed and declares the task as an entry point."""
-    info = tmp_path / "press_kit-1.0.dist-info"
+    install(tmp_path, "[handrail.tasks]\npress = press_kit:PRESS\n")
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def install(folder, entries):
+    """Let a folder of the path say that a package is installed."""
+    info = folder / "press_kit-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: press-kit\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[handrail.tasks]\npress = press_kit:PRESS\n")
-    monkeypatch.syspath_prepend(tmp_path)
+    (info / "entry_points.txt").write_text(entries)
 
 
 def test_it_is_recorded_under_the_names_that_find_it_again(recorded):
@@ -105,6 +121,21 @@ def test_an_installed_entry_is_listed_recorded_and_found_again(installed, tmp_pa
     assert unseen()  # the help imports nothing
     ran(tmp_path / "set", "--task", "press", "--dataset.num_episodes", 1, "--time_limit", 0.5)
     ran(tmp_path / "set", name="replay")
+
+
+def test_a_metric_of_an_installed_package_is_in_the_report(recorded, tmp_path):
+    install(tmp_path, "[handrail.metrics]\npresses = kit_metrics:presses\n")
+    (tmp_path / "kit_metrics.py").write_text(METRIC)
+    other = shutil.copytree(recorded, tmp_path / "other")
+    program = [sys.executable, "-m", "handrail.scripts", "compare"]
+    command = [*program, recorded, other, "--output", tmp_path / "report"]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    subprocess.run([*map(str, command)], env=environment, check=True, capture_output=True)
+    values = json.loads((tmp_path / "report" / "report.json").read_text())["values"]
+    own, ours = ([each for each in values if each["metric"] == name] for name in ("presses", "length"))
+    assert [each["estimate"] for each in own] == [each["estimate"] for each in ours]
+    assert own
+    assert "how long the press took" in (tmp_path / "report" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(
