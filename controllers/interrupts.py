@@ -1,6 +1,5 @@
 """Ctrl-C and SIGTERM while something is recorded or run."""
 
-import _thread
 import contextlib
 import signal
 import sys
@@ -61,7 +60,8 @@ class Interrupts:
     def _again(self, lost: "sys.UnraisableHookArgs") -> None:
         """Let an interrupt come again that was raised in a destructor or callback: Python drops it there."""
         if issubclass(lost.exc_type, KeyboardInterrupt):
-            threading.Timer(_AGAIN, _thread.interrupt_main).start()
+            main = threading.main_thread().ident
+            threading.Timer(_AGAIN, signal.pthread_kill, (main, signal.SIGINT)).start()
         else:
             self._unraisable(lost)
 

@@ -55,11 +55,6 @@ class CollisionModel:
         """Number of pairs P."""
         return len(self.pairs)
 
-    @property
-    def any_moving(self) -> bool:
-        """Whether any obstacle moves."""
-        return bool(self.memory.speed.any())
-
     def distances(
         self, q: FloatArray, within: FloatArray | float = np.inf, times: FloatArray | None = None
     ) -> Distances:
