@@ -189,3 +189,22 @@ def test_an_arm_without_a_base_completes_too():
         v = complete(HOME[3:], np.zeros(6), twist, STEP)
         assert v.shape == (6,)
         assert (arm.jacobian(HOME[3:]) @ v) @ twist > 0
+
+
+def test_mink_keeps_its_distance():
+    """Drive the hand into the robot's own mount: plain least squares gets close, mink does not."""
+    pytest.importorskip("mink")
+    smallest = {}
+    for name in ("dls", "mink"):
+        rival, q, v = controller(name), HOME.copy(), REST
+        for step in range(500):
+            towards = MODEL.pose(q, "shoulder_link").position - MODEL.pose(q).position
+            twist = np.append(0.15 * towards / np.linalg.norm(towards), np.zeros(3))
+            command = rival.update(
+                State(q, v, step * STEP), intent(of_the_tool(twist), "ee", time=step * STEP)
+            )
+            after = command.velocity(STEP)
+            q, v = q + 0.5 * STEP * (v + after), after
+            smallest[name] = min(smallest.get(name, np.inf), command.diagnostics.smallest_distance)
+    assert smallest["dls"] < 0.02
+    assert smallest["mink"] > 0.04

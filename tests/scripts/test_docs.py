@@ -140,3 +140,11 @@ def test_a_table_s_first_column_is_complete(page, heading):
     rows = re.findall(r"^\| (`.*?) \|", section, re.MULTILINE)
     named = {name.split(" ")[0] for row in rows for name in re.findall("`(.*?)`", row)}
     assert named == TABLES[page, heading]()
+
+
+def test_every_feature_s_test_exists():
+    """`tests/features.md` names one test for each feature of README and pages."""
+    tests = ROOT / "tests"
+    named = re.findall(r"`([\w/]+\.py)::(\w+)`", (tests / "features.md").read_text())
+    assert len(named) > 200
+    assert [each for each in named if f"def {each[1]}(" not in (tests / each[0]).read_text()] == []
