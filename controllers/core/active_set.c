@@ -40,10 +40,14 @@ WIDE static void forward(const Core *c, double *x, int64_t start) {
   }
 }
 
+/* x = L'^-1 x. What does not need the last results is summed apart, so that it need not wait for them. */
 WIDE static void backward(const Core *c, double *x) {
   for (int64_t j = c->M - 1; j >= 0; j--) {
     const double *row = c->band + j * c->B;
-    x[j] = (x[j] - dot(row + 1, x + j + 1, SMALLER(c->B, c->M - j) - 1)) / row[0];
+    int64_t width = SMALLER(c->B, c->M - j), near = SMALLER(width, 5);
+    double sum = dot(row + near, x + j + near, width - near);
+    for (int64_t t = near - 1; t > 0; t--) sum += row[t] * x[j + t];
+    x[j] = (x[j] - sum) / row[0];
   }
 }
 
@@ -60,7 +64,13 @@ WIDE static double project(Core *c, int64_t count) {
   memcpy(c->normal, c->fresh, c->V * sizeof(double));
   memset(c->coordinates, 0, count * sizeof(double));
   for (;;) {
-    for (int64_t i = 0; i < count; i++) {
+    int64_t i = 0;
+    for (; i + 4 <= count; i += 4) {
+      double shares[4];
+      take_four(c->normal, c->directions + i * c->V, c->V, c->V, shares);
+      for (int row = 0; row < 4; row++) c->coordinates[i + row] += shares[row];
+    }
+    for (; i < count; i++) {
       double share = dot(c->directions + i * c->V, c->normal, c->V);
       c->coordinates[i] += share;
       add(c->normal, -share, c->directions + i * c->V, c->V);

@@ -84,7 +84,7 @@ int64_t number_at(const Core *c, int64_t place) {
 }
 
 /* Return the place of the row that (s, sigma) breaks most, active ones left out; -1 if none. */
-int64_t most_violated(const Core *c, const Scene *scene) {
+WIDE int64_t most_violated(const Core *c, const Scene *scene) {
   int64_t n = c->n, row = -1, first = joint_rows(c);
   double worst = 0.0;
   for (int64_t i = 0; i < SLACKS; i++)
