@@ -9,9 +9,7 @@ from msgspec import Meta
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.typed import check_settings
 
-CLIENTS: Mapping[str, Mapping[str, str]] = {  # the robots, and what they call our cameras
-    "lekiwi": {"scene": "front", "wrist": "wrist"},
-}
+CLIENTS: Mapping[str, tuple[str, ...]] = {"lekiwi": ("front", "wrist")}  # the robots, and their cameras
 Port = Annotated[int, Meta(ge=1, le=65535)]
 NO_SCREEN = "browser"  # it draws a simulation
 

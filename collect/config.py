@@ -25,7 +25,6 @@ from handrail.datasets.lists import Names
 
 REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
 FOUND = Path("outputs/cockpit")  # of datasets whose folders nobody says
-CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
 WORTH_SHARING = 100  # episodes from which on several processes are quicker than one
 MOST_MOVING = 4
@@ -59,7 +58,7 @@ class SessionConfig:
     seed: Count = 0
     """Of scenes and operator: the same seed and versions give the same data."""
     cameras: Names = ""
-    """Cameras to record: wrist, scene or all; none by default."""
+    """Cameras of the robot to record, such as front,wrist; scene overlooks it; all, or none by default."""
     image_size: Advanced[Annotated[int, Meta(ge=16, le=1024, multiple_of=2)]] = 128
     """Height and width of the pictures [pixels]."""
     realtime: Advanced[bool] = False
@@ -74,7 +73,13 @@ class SessionConfig:
     @property
     def camera_names(self) -> tuple[str, ...]:
         """The cameras asked for."""
-        return names(self.cameras, CAMERAS)
+        return names(self.cameras, self._robot_cameras) if self.cameras else ()
+
+    @property
+    def _robot_cameras(self) -> tuple[str, ...]:
+        from handrail.controllers.robot.description import load_description
+
+        return load_description(self.robot).camera_names
 
     @property
     def mode_name(self) -> str:
@@ -87,7 +92,7 @@ class SessionConfig:
         MODES.check(self.mode)
         OPERATORS.check(self.operator)
         if self.camera_names:
-            check_names("camera", "--cameras", self.camera_names, CAMERAS)
+            check_names("camera", "--cameras", self.camera_names, self._robot_cameras)
         check_settings(self, "--")
         if self.moving_obstacles and not TASKS.find(self.task).movers:
             fit = " or ".join(spec.name for spec in TASKS.built_in if spec.movers)

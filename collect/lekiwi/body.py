@@ -12,7 +12,7 @@ from handrail.collect.world.rendering import Painter
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import turned
 
-CAMERAS = {"front": ("scene", (480, 640)), "wrist": ("wrist", (640, 480))}  # LeRobot's names and sizes, ours
+SIZES = {"front": (480, 640), "wrist": (640, 480)}  # of LeRobot's pictures, height and width
 _STIFFNESS = 12.0  # of the position servos: speed per error [1/s]
 _AT_ONCE = 0.5  # of what it has fallen behind it catches up so much in a round [s]
 
@@ -97,11 +97,10 @@ class LeKiwiBody:
 
     def picture(self, camera: str) -> np.ndarray:
         """Return what a camera of LeKiwi's sees, (height, width, 3)."""
-        ours, size = CAMERAS[camera]
         now = self._env.simulation
         if camera not in self._painters:
-            self._painters[camera] = Painter(size)
-        return self._painters[camera].paint(now.mujoco_model, now.data, ours)
+            self._painters[camera] = Painter(SIZES[camera])
+        return self._painters[camera].paint(now.mujoco_model, now.data, camera)
 
     def close(self) -> None:
         """Give the OpenGL contexts back."""

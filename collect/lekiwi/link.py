@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.client_config import CLIENTS, ClientConfig
+from handrail.collect.flags import check_names
 from handrail.collect.lekiwi.host import import_zmq
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
 from handrail.collect.processor.units import robot_units
@@ -117,16 +118,15 @@ class Link:
                 self.late += 1
 
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> dict[str, NDArray[np.uint8]]:
-        """Return what cameras of ours see, (height, width, 3), in a size (height, width)."""
+        """Return what its cameras see, (height, width, 3), in a size (height, width)."""
         import cv2
 
         seen: dict[str, Any] = {}
         for camera in cameras:
-            name = CLIENTS[self._name][camera]
-            if name not in self._said:
-                raise HandrailError(f"robot {self._name}: camera {name} says nothing; look at its cable")
+            if camera not in self._said:
+                raise HandrailError(f"robot {self._name}: camera {camera} says nothing; look at its cable")
             # LeRobot's client hands on OpenCV's pictures, whose colours are the other way round
-            picture = cv2.cvtColor(np.asarray(self._said[name]), cv2.COLOR_BGR2RGB)
+            picture = cv2.cvtColor(np.asarray(self._said[camera]), cv2.COLOR_BGR2RGB)
             seen[camera] = cv2.resize(picture, size[::-1], interpolation=cv2.INTER_AREA)
         return seen
 
@@ -189,7 +189,7 @@ def connect(
     Args:
         robot: which one.
         config: where it is.
-        cameras: of ours, that it shall show.
+        cameras: that it shall show.
         model: of the robot.
         fps: commands a second.
     """
@@ -197,12 +197,13 @@ def connect(
     from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
     from lerobot.robots.lekiwi.config_lekiwi import lekiwi_cameras_config
 
-    wanted = {CLIENTS[robot][camera] for camera in cameras}
+    if cameras:
+        check_names("camera", f"--robot_client {robot}: --cameras", cameras, CLIENTS[robot])
     settings = LeKiwiClientConfig(
         remote_ip=config.remote_ip,
         port_zmq_cmd=config.port_zmq_cmd,
         port_zmq_observations=config.port_zmq_observations,
-        cameras={name: camera for name, camera in lekiwi_cameras_config().items() if name in wanted},
+        cameras={name: camera for name, camera in lekiwi_cameras_config().items() if name in cameras},
     )
     client: Any = LeKiwiClient(settings)
     try:

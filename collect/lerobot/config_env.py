@@ -8,7 +8,7 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from msgspec import Meta
 
-from handrail.collect.config import CAMERAS, SessionConfig
+from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot.configs import SimulatedConfig
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MASK, MODES
@@ -44,7 +44,6 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
             ACTION: ACTION,
             "agent_pos": OBS_STATE,
             "environment_state": OBS_ENV_STATE,
-            **{f"pixels/{camera}": f"{OBS_IMAGES}.{camera}" for camera in CAMERAS},
         }
     )
 
@@ -61,7 +60,9 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
         if not self.scene_in_state:
             self.features["environment_state"] = PolicyFeature(FeatureType.ENV, (scene,))
         picture = PolicyFeature(FeatureType.VISUAL, (self.image_size, self.image_size, 3))
-        self.features |= {f"pixels/{camera}": picture for camera in config.camera_names}
+        for camera in config.camera_names:
+            self.features[f"pixels/{camera}"] = picture
+            self.features_map.setdefault(f"pixels/{camera}", f"{OBS_IMAGES}.{camera}")
 
     def session(self) -> SessionConfig:
         """Return the settings of the session behind it."""

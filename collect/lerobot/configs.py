@@ -22,7 +22,7 @@ class SimulatedConfig:
     robot: str = SessionConfig.robot
     """A robot, or a description file (.toml)."""
     camera_names: str = ""
-    """Cameras: wrist, scene or both, with a comma; none by default."""
+    """Cameras of the robot, or scene, with commas; none by default."""
     image_size: int = SessionConfig.image_size
     """Height and width of the pictures [px]."""
     moving_obstacles: int = 0

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from handrail.collect.config import CAMERAS, DatasetConfig, RecordConfig
+from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, shown, unknown_name
@@ -117,7 +117,6 @@ class UserStudy:
             "form": (self.forms, FORMS),
             "allow": (self.allow, ALLOWED),
             "robot": ((self.robot,), ROBOTS),
-            "camera": (self.cameras, CAMERAS),
             "question": (asked, asked),
             "mode in [instructions]": (self.instructions, self.modes),
         }

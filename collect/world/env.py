@@ -18,6 +18,7 @@ from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Start, Task, TaskState, Verdict
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
+from handrail.controllers.robot.description import SCENE_CAMERA
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
 
@@ -37,7 +38,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         robot: name of a robot, its description file, or its model.
         fps: steps a second, 10 to 100.
         plant: makes the robot in its world, as the class `Simulation` does: MuJoCo's, or another.
-        cameras: which of `wrist`, `scene` to show as `pixels`.
+        cameras: which of the robot's, or `scene`, to show as `pixels`.
         image_size: height and width of `pixels` [px].
         render_mode: `rgb_array` or None.
         render_size: height and width of what `render` returns [px].
@@ -77,6 +78,9 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.model: RobotModel = robot if isinstance(robot, RobotModel) else load_model(robot)
         self.fps, self.period, self.real = fps, 1.0 / fps, real
         self.cameras, self.image_size = tuple(cameras), image_size
+        for camera in self.cameras:
+            if camera not in self.model.description.camera_names:
+                raise unknown_name("camera", camera, self.model.description.camera_names)
         self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
@@ -213,7 +217,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a good-looking picture from the scene camera, if `render_mode` is `rgb_array`."""
-        return self._paint("render", "scene", self.render_size) if self.render_mode else None
+        return self._paint("render", SCENE_CAMERA, self.render_size) if self.render_mode else None
 
     def _paint(self, use: str, camera: str, size: tuple[int, int]) -> NDArray[np.uint8]:
         now = self.simulation

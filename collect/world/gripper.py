@@ -1,6 +1,4 @@
-"""The gripper: two fingers that hold by friction, sliding or as a jaw; the camera that watches them."""
-
-from typing import Any
+"""The gripper: two fingers that hold by friction, sliding or as a jaw."""
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +17,7 @@ _STIFFNESS, _DAMPING = 6000.0, 120.0  # of its servo, at the pad [N/m], [N s/m]
 def add_gripper(
     spec: MjSpec, gripper: Gripper, mount: MjsBody, frame: pin.SE3, zero: pin.SE3 | None, grips: bool
 ) -> MjsBody:
-    """Add palm mass, fingers, their servo and the wrist camera; return the body of the left finger.
+    """Add palm mass, fingers and their servo; return the body of the left finger.
 
     Where it does not grip, the fingers are fixed, open: moving ones take a third of a physics step.
 
@@ -36,11 +34,8 @@ def add_gripper(
     size = np.array([gripper.stroke, gripper.stroke, length])
     geometry.set_box_inertia(palm, gripper.mass, size, [0.0, 0.0, length / 2])
     if gripper.jaw is None or zero is None:
-        left = _add_sliding_fingers(spec, gripper, palm, grips)
-    else:
-        left = _add_jaw(spec, gripper, gripper.jaw, palm, frame.actInv(zero), grips)
-    palm.add_camera(name="wrist", fovy=70.0, **_camera_pose(gripper))
-    return left
+        return _add_sliding_fingers(spec, gripper, palm, grips)
+    return _add_jaw(spec, gripper, gripper.jaw, palm, frame.actInv(zero), grips)
 
 
 def _shifted(x: float, z: float) -> pin.SE3:
@@ -171,18 +166,3 @@ def _add_servo(spec: MjSpec, gripper: Gripper, target: str, kind: object, lever:
         forcerange=[-gripper.force * lever, gripper.force * lever],
     )
     servo.set_to_position(kp=_STIFFNESS * lever**2, kv=_DAMPING * lever**2)
-
-
-def _camera_pose(gripper: Gripper) -> dict[str, Any]:
-    """Return the pose of a camera beside the palm that looks along z, tilted towards the finger tips.
-
-    The fingers open from left to right in the picture.
-    """
-    ahead = np.array([0.0, 0.0, 1.0])
-    sideways = np.cross(ahead, gripper.camera)
-    if not np.any(sideways):
-        sideways = np.array([1.0, 0.0, 0.0])
-    right = sideways / np.linalg.norm(sideways)
-    outward = np.cross(right, ahead)  # unit, from the axis to the camera
-    forward = np.cos(gripper.camera_tilt) * ahead - np.sin(gripper.camera_tilt) * outward
-    return geometry.camera_pose(np.array(gripper.camera), right, forward)

@@ -38,6 +38,10 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> M
     at = geometry.pose(tool.placement.translation, tool.placement.rotation)
     bodies[tool.parentJoint].add_site(name="tool", group=4, **at)
     _add_contact_shapes(model, bodies)
+    for camera in model.description.cameras:
+        joint, at = _place(model, camera.frame, Placement(np.array(camera.position), camera.axes))
+        pose = geometry.pose(at.translation, at.rotation)
+        bodies[joint].add_camera(name=camera.name, fovy=camera.fovy, **pose)
     gripper = model.description.end_effector.gripper
     jaw = _add_hand(spec, model, gripper, bodies, grips) if gripper else None
     _add_pairs(spec, model)

@@ -8,6 +8,7 @@ import numpy as np
 from handrail.collect.world import geometry
 from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
+from handrail.controllers.robot.description import SCENE_CAMERA
 
 
 def new_stage(looks: bool) -> MjSpec:
@@ -23,7 +24,7 @@ def add_scene(spec: MjSpec, scene: Scene) -> None:
     """Add the objects and the scene camera to the spec."""
     for item in scene.objects:
         _add_object(spec, item)
-    spec.worldbody.add_camera(name="scene", fovy=scene.view.fovy, **_view_pose(scene.view))
+    spec.worldbody.add_camera(name=SCENE_CAMERA, fovy=scene.view.fovy, **_view_pose(scene.view))
 
 
 def _add_object(spec: MjSpec, item: SceneObject) -> None:

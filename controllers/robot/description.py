@@ -18,6 +18,7 @@ from handrail.controllers.robot.parts import (
     ZERO,
     AtLeastZero,
     Base,
+    Camera,
     EndEffector,
     Gripper,
     Lengths,
@@ -32,6 +33,7 @@ from handrail.controllers.robot.shape import Shape, ShapeKind
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import Fraction, Positive, Text, decoded
 
+SCENE_CAMERA = "scene"
 _KINDS: tuple[ShapeKind, ...] = ("box", "capsule", "cylinder", "sphere")
 
 
@@ -52,6 +54,7 @@ class RobotDescription:
     self_pairs: tuple[tuple[str, str], ...]
     self_margins: FloatArray  # largest margin that each self pair can keep [m]
     visual: tuple[PlacedShape, ...]
+    cameras: tuple[Camera, ...]
     world: WorldScale
 
     def __post_init__(self) -> None:
@@ -63,6 +66,11 @@ class RobotDescription:
     def joints(self) -> tuple[str, ...]:
         """Names of all generalised coordinates, base first."""
         return self.base.joints + self.arm_joints
+
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Names of the cameras that can be recorded: its own, and one that overlooks the scene."""
+        return (*(camera.name for camera in self.cameras), SCENE_CAMERA)
 
 
 def robot_names() -> list[str]:
@@ -181,6 +189,7 @@ class _File:
     self_collision: _SelfCollision
     collision: _Shapes
     visual: _Shapes = ()
+    camera: tuple[Camera, ...] = ()
     gripper: Gripper | None = None
     world: WorldScale = field(default_factory=WorldScale)
 
@@ -202,6 +211,7 @@ def _described(file: _File, urdf: Path, mesh_root: Path) -> RobotDescription:
         self_pairs=tuple((pair.first, pair.second) for pair in pairs),
         self_margins=frozen([pair.margin for pair in pairs]),
         visual=tuple(shape.placed() for shape in file.visual),
+        cameras=file.camera,
         world=file.world,
     )
 
@@ -226,7 +236,8 @@ def _check_joints(robot: RobotDescription) -> None:
 
 
 def _check_names(robot: RobotDescription) -> None:
-    """Check that collision shapes have names of their own, and that no others are used."""
+    """Check that shapes and cameras have names of their own, and that no others are used."""
+    _check_once(robot.camera_names, "camera")
     names = [shape.name for shape in robot.collision]
     _check_once(names, "collision")
     if "" in names:

@@ -16,6 +16,7 @@ from handrail.controllers.typed import Listed, Number, Positive, Text
 _PLANAR = ("x", "y", "theta")
 _BEYOND = 0.01  # touching, where fingers are sent to close [m]
 ZERO = (0.0, 0.0, 0.0)
+_ASIDE = 1e-6
 
 AtLeastZero = Annotated[float, Meta(ge=0, le=1e6)]
 Vector = tuple[Number, Number, Number]
@@ -83,6 +84,38 @@ class Jaw:
 
 
 @dataclass(frozen=True)
+class Camera:
+    """A camera on a frame, and the point there that it looks at [m]; `up` is above in its pictures."""
+
+    name: Text
+    frame: Text
+    position: Vector
+    looks_at: Vector
+    up: Vector = (0.0, 0.0, 1.0)
+    fovy: Annotated[float, Meta(ge=5, le=150)] = 75.0
+    """Vertical field of view [deg]."""
+
+    def __post_init__(self) -> None:
+        """Check that its axes can be told."""
+        if not float(np.linalg.norm(np.cross(self.axes[:, 1], self._forward))) > _ASIDE:
+            raise HandrailError(
+                f"camera {self.name}: expected looks_at away from position, and up aside from there; "
+                f"got {self.position}, {self.looks_at}, up {self.up}"
+            )
+
+    @property
+    def _forward(self) -> FloatArray:
+        return np.subtract(self.looks_at, self.position)
+
+    @property
+    def axes(self) -> FloatArray:
+        """Right, up and back in the frame, as columns, (3, 3); zero where they cannot be told."""
+        forward, right = self._forward, np.cross(self._forward, self.up)
+        axes = np.column_stack([right, np.cross(right, forward), -forward])
+        return axes / np.maximum(np.linalg.norm(axes, axis=0), _ASIDE)
+
+
+@dataclass(frozen=True)
 class Gripper:
     """Two fingers that slide along the x axis of a placement on a frame; lengths [m], force [N], speed [m/s].
 
@@ -99,8 +132,6 @@ class Gripper:
     force: Positive
     speed: Positive
     friction: Positive
-    camera: Vector
-    camera_tilt: Number
     translation: Vector = ZERO
     rpy: Vector = ZERO
     shape: Text = "fingers"

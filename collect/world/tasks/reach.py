@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.observation import padded, pose_names, pose_numbers, row_names
-from handrail.collect.world.scene import Part, Patrol, Scene, SceneObject, Viewpoint
+from handrail.collect.world.scene import Part, Patrol, Scene, SceneObject, Viewpoint, box
 from handrail.collect.world.task import Aim, Start, Task, TaskState, Verdict
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.goal_reaching import (
@@ -18,13 +18,20 @@ from handrail.collect.world.tasks.goal_reaching import (
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis
+from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.inverse_kinematics import body_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Shape
 
-_COLOURS = ((0.85, 0.15, 0.15, 1.0), (0.15, 0.7, 0.2, 1.0), (0.15, 0.3, 0.9, 1.0))
-_ARROW = 0.18  # length of the marker's axes [m]
+_COLOURS = (  # of the marker's faces: +x, −x, +y, −y, +z, −z
+    (0.90, 0.10, 0.10, 1.0),
+    (0.45, 0.75, 1.00, 1.0),
+    (0.10, 0.70, 0.15, 1.0),
+    (1.00, 0.45, 0.85, 1.0),
+    (0.10, 0.15, 0.90, 1.0),
+    (1.00, 0.85, 0.10, 1.0),
+)
+_EDGE = 0.18  # of the marker [m]
 _MOST_TRIES = 200
 _REACHED = 1e-3  # error of the hand's pose that is left [m, rad]
 _CLEAR = 0.12  # kept to itself and to the floor there, at scale 1 [m]
@@ -164,12 +171,11 @@ def _errors(state: TaskState) -> tuple[float, float]:
 
 
 def goal_marker(goal: Pose, scale: float = 1.0) -> SceneObject:
-    """Return three coloured axes on a ball, drawn without contact."""
-    arrow = Shape("capsule", scale * np.array([0.011, _ARROW]))
-    axes = (
-        Part(arrow, scale * axis * _ARROW / 2, matrix_to_axis(axis), colour)
-        for axis, colour in zip(np.eye(3), _COLOURS, strict=True)
+    """Return a cube whose faces have six colours, drawn without contact: place and turn can be seen."""
+    edge, sides = scale * _EDGE, [(axis, side) for axis in np.eye(3) for side in (1.0, -1.0)]
+    faces = (
+        Part(box(edge - 0.96 * edge * axis), 0.48 * side * edge * axis, rgba=colour)
+        for (axis, side), colour in zip(sides, _COLOURS, strict=True)
     )
-    ball = Part(Shape("sphere", scale * np.array([0.03])), np.zeros(3), rgba=(0.95, 0.85, 0.2, 1.0))
-    around = Shape("sphere", scale * np.array([_ARROW]))
-    return SceneObject("goal", around, goal.position, goal.rotation, ghost=True, parts=(*axes, ball))
+    cube = box([edge] * 3)
+    return SceneObject("goal", cube, goal.position, goal.rotation, ghost=True, parts=tuple(faces))

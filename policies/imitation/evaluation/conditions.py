@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypedDict
 
-from handrail.collect.config import CAMERAS, MOST_MOVING, SessionConfig
+from handrail.collect.config import MOST_MOVING, SessionConfig
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_mode, build_task
@@ -21,6 +21,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.regular_file import open_regular
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.robot.description import load_description
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.typed import Count, check
 from handrail.datasets.reading.reader import read_episodes, read_info
@@ -96,6 +97,10 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
         meta = replace(meta, environment=task, robot=robot)
     if not TASKS.accepts(meta.environment):
         raise HandrailError(f"{where}: expected a task of {', '.join(TASKS)}, got {meta.environment!r}")
+    cameras = load_description(meta.robot).camera_names
+    if unknown := [camera for camera in pictures if camera not in cameras]:
+        words = f"expected one of {', '.join(cameras)}"
+        raise HandrailError(f"{where}: reads the camera {unknown[0]!r}: {words}")
     movers, joined = _scene(sizes, where, meta)
     return Checkpoint(place, meta, pictures, movers, joined, _digest(place))
 
@@ -135,11 +140,8 @@ def _features(settings: Mapping[str, Any], where: str) -> tuple[dict[str, int], 
                 raise HandrailError(f"{where}: {name}: expected {expected}, got {shape}")
             if camera == name:
                 sizes[name] = shape[0]
-            elif camera in CAMERAS:
-                pictures[camera] = shape[1:]
             else:
-                words = f"expected one of {', '.join(CAMERAS)}"
-                raise HandrailError(f"{where}: reads the camera {camera!r}: {words}")
+                pictures[camera] = shape[1:]
     return sizes, pictures
 
 

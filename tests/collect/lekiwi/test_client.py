@@ -106,7 +106,7 @@ def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
     picture = np.zeros((480, 640, 3), np.uint8)
     picture[..., 2] = 200  # red, as OpenCV has it
     one = link(PlayedClient(cameras={"front": picture}))
-    seen = one.pictures(("scene",), (64, 96))["scene"]
+    seen = one.pictures(("front",), (64, 96))["front"]
     assert seen.shape == (64, 96, 3)
     assert seen[0, 0].tolist() == [200, 0, 0]
     with pytest.raises(HandrailError, match="camera wrist says nothing"):

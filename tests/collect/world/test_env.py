@@ -95,7 +95,7 @@ def test_names_match_the_numbers():
     ("options", "message"),
     [
         ({"fps": 5}, "fps 5: expected 10 to 100 steps a second"),
-        ({"cameras": ("left",)}, "unknown camera 'left': expected one of scene, wrist"),
+        ({"cameras": ("left",)}, "unknown camera 'left': expected one of front, scene, wrist"),
         ({"render_mode": "human"}, "unknown render mode 'human': expected one of rgb_array"),
         ({"robot": "hal"}, "unknown robot 'hal'"),
     ],

@@ -128,7 +128,7 @@ def test_what_lerobot_record_recorded_is_driven_with_its_mode(size, mode, number
         ({"observation.state": entry("STATE", 6)}, "state': 6, .*environment_state': 7, 'action': 10"),
         ({"observation.environment_state": entry("ENV", 8)}, "environment_state': 8"),
         ({"observation.force": entry("STATE", 6)}, "observation.force"),
-        ({"observation.images.front": entry("VISUAL", 3, 64, 64)}, "camera 'front': expected one of wrist"),
+        ({"observation.images.roof": entry("VISUAL", 3, 64, 64)}, "camera 'roof': expected one of front"),
         ({"observation.images.wrist": entry("VISUAL", 64, 64)}, "expected channels, height and width"),
         ({"observation.state": entry("STATE", 2, 13)}, "expected one dimension"),
         ({"observation.state": entry("STATE", "x")}, "expected a whole number"),
