@@ -17,12 +17,13 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.teleop_config import TeleopConfig
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.controllers.typed import AtLeastOne, Count, check_settings
+from handrail.controllers.typed import AtLeastOne, Count, check, check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names
 
+_Side = Annotated[int, Meta(ge=16, le=1024, multiple_of=2)]
 REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
 FOUND = Path("outputs/cockpit")  # of datasets whose folders nobody says
 FPS_RANGE = (10, 100)
@@ -59,8 +60,8 @@ class SessionConfig:
     """Of scenes and operator: the same seed and versions give the same data."""
     cameras: Names = ""
     """Cameras of the robot to record, such as front,wrist; scene overlooks it; all, or none by default."""
-    image_size: Advanced[Annotated[int, Meta(ge=16, le=1024, multiple_of=2)]] = 128
-    """Height and width of the pictures [pixels]."""
+    image_size: Advanced[int | str] = 128
+    """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
     realtime: Advanced[bool] = False
     """Pace the loop by the wall clock."""
     physics: Advanced[bool] = True
@@ -82,6 +83,16 @@ class SessionConfig:
         return load_description(self.robot).camera_names
 
     @property
+    def image_shape(self) -> tuple[int, int]:
+        """Height and width of the pictures [px]."""
+        width, times, height = str(self.image_size).partition("x")
+        sides = (height, width) if times else (width, width)
+        if not all(side.isdecimal() for side in sides):
+            raise HandrailError(f"--image_size: expected 128 or 160x120, got {shown(self.image_size)}")
+        first, second = (check(int(side[:9]), _Side, "--image_size") for side in sides)
+        return first, second
+
+    @property
     def mode_name(self) -> str:
         """What the data calls it: the mode's name, or the mask that is steered with instead."""
         return f"mask:{self.mask}" if self.mask else self.mode
@@ -94,6 +105,7 @@ class SessionConfig:
         if self.camera_names:
             check_names("camera", "--cameras", self.camera_names, self._robot_cameras)
         check_settings(self, "--")
+        self.image_shape  # noqa: B018
         if self.moving_obstacles and not TASKS.find(self.task).movers:
             fit = " or ".join(spec.name for spec in TASKS.built_in if spec.movers)
             raise HandrailError(f"--moving_obstacles: expected --task {fit}, got --task {self.task}")

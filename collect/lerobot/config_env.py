@@ -59,7 +59,7 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
         }
         if not self.scene_in_state:
             self.features["environment_state"] = PolicyFeature(FeatureType.ENV, (scene,))
-        picture = PolicyFeature(FeatureType.VISUAL, (self.image_size, self.image_size, 3))
+        picture = PolicyFeature(FeatureType.VISUAL, (*config.image_shape, 3))
         for camera in config.camera_names:
             self.features[f"pixels/{camera}"] = picture
             self.features_map.setdefault(f"pixels/{camera}", f"{OBS_IMAGES}.{camera}")

@@ -23,8 +23,8 @@ class SimulatedConfig:
     """A robot, or a description file (.toml)."""
     camera_names: str = ""
     """Cameras of the robot, or scene, with commas; none by default."""
-    image_size: int = SessionConfig.image_size
-    """Height and width of the pictures [px]."""
+    image_size: int | str = SessionConfig.image_size
+    """Size of the pictures [px]: of a square's side, or WIDTHxHEIGHT."""
     moving_obstacles: int = 0
     """Obstacles that cross the robot's way; task reach only."""
     fps: int = 20

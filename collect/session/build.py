@@ -57,7 +57,7 @@ def build_env(
         plant=plant or (Simulation if config.physics else IdealRobot),
         real=plant is not None,
         cameras=config.camera_names,
-        image_size=(config.image_size, config.image_size),
+        image_size=config.image_shape,
         render_mode="rgb_array" if render else None,
         render_size=render if isinstance(render, tuple) else RENDER_SIZE,
         sample=partial(sample_shifted, task, shift) if shift else None,

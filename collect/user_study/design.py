@@ -99,7 +99,7 @@ class UserStudy:
     robot: str = "ridgeback_ur10"
     fps: int = 20  # of the recording [Hz]
     cameras: tuple[str, ...] = ()
-    image_size: int = 128  # [pixels]
+    image_size: int | str = 128  # [pixels], or WIDTHxHEIGHT
     time_limit: float | int = 0.0  # of a trial [s]; the task's own when 0
     seed: Count = 0  # of scenes and orders
     demo: bool = False  # participants are synthetic, which every table says then

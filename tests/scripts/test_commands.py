@@ -51,6 +51,7 @@ WRONG = {
         ["--image_size", "33"],
         "--image_size: expected a whole number that's a multiple of 2, got 33",
     ),
+    "image size text": (["--image_size", "160x"], "--image_size: expected 128 or 160x120, got '160x'"),
     "robot": (["--robot", "spot"], "unknown robot 'spot'"),
     "flag": (["--speed", "9"], "--speed"),
     "repo id": (["--dataset.repo_id", "no spaces/please/ever"], "repo_id"),

@@ -180,15 +180,17 @@ def run_rollout(
 
 def _session_config(condition: PolicyCondition) -> SessionConfig:
     checkpoint = condition.checkpoint
-    sizes = {size for picture in checkpoint.pictures.values() for size in picture} or {128}
-    if len(sizes) > 1:
-        raise HandrailError(f"{checkpoint.folder}: expected square pictures, got {checkpoint.pictures}")
+    shapes = set(checkpoint.pictures.values()) or {(128, 128)}
+    if len(shapes) > 1:
+        words = "expected pictures of one size"
+        raise HandrailError(f"{checkpoint.folder}: {words}, got {checkpoint.pictures}")
+    height, width = shapes.pop()
     return SessionConfig(
         task=checkpoint.meta.environment,
         robot=checkpoint.meta.robot,
         moving_obstacles=checkpoint.movers,
         cameras=",".join(checkpoint.pictures),
-        image_size=sizes.pop(),
+        image_size=f"{width}x{height}",
         time_limit=condition.time_limit,
     )
 

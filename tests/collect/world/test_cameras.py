@@ -59,6 +59,15 @@ def test_the_goal_is_in_the_pictures_of_first_frames(robot, share):
     assert found >= share * 20
 
 
+@pytest.mark.needs_gl
+def test_pictures_may_be_wider_than_high():
+    env = build_env(SessionConfig(task="reach", cameras="front", image_size="64x32"), 20)
+    picture = env.reset(seed=0)[0]["pixels"]["front"]
+    assert picture.shape == (32, 64, 3)
+    assert env.observation_space["pixels"]["front"].shape == (32, 64, 3)
+    env.close()
+
+
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
