@@ -125,6 +125,11 @@ GROUPS: Mapping[str, Mapping[str, Program]] = {
                 "trim": _edit("TrimConfig", "cut off what is idle at both ends"),
                 "relabel": _edit("RelabelConfig", "say with --label how --episodes ended"),
                 "rename": _edit("RenameConfig", "give the task another sentence, --task"),
+                "render": Verb(
+                    "add pictures, drawn while the episodes' commands run again",
+                    "collect.commands.config:RenderConfig",
+                    "collect.commands.render:render",
+                ),
                 "pack": Verb(
                     "write a dataset into few large files",
                     "datasets.editing.config:PackConfig",

@@ -7,10 +7,12 @@ from typing import Annotated
 
 import tyro
 
-from handrail.collect.config import StoredConfig
+from handrail.collect.config import SessionConfig, StoredConfig
 from handrail.collect.flags import check_file, only_one
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.advanced import Advanced
+from handrail.datasets.editing.config import EditConfig
+from handrail.datasets.lists import Names
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,27 @@ class ReplayConfig:
         check_file("--video", self.video, ".mp4")
         if self.video and self.episode < 0:
             raise HandrailError("--video: expected --episode with the number of one episode")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderConfig(EditConfig):
+    """Write a dataset with pictures of its episodes, drawn while their commands run again.
+
+    One that was begun is gone on with.
+    """
+
+    verb = "render"
+    needed = ("output", "cameras")
+    cameras: Names = ""
+    """Cameras of the robot, such as front,wrist; scene overlooks it; or all."""
+    image_size: int | str = SessionConfig.image_size
+    """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
+
+    def check(self) -> None:
+        """Check what can be checked without reading anything."""
+        if self.in_place:
+            raise HandrailError("--in_place: expected --output with render")
+        super().check()
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Replays a recorded episode's commands and reports how far the motion deviates."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from handrail.collect.commands.config import ReplayConfig
 from handrail.collect.session.build import build_env
 from handrail.collect.session.film import VideoFile
 from handrail.collect.session.recorded import recorded_settings
-from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv, Observation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Command
@@ -25,6 +25,7 @@ from handrail.datasets.recording.slice import TRIMMED
 
 _HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts begun")
 _MOST_TRIMMED = 100_000  # frames; more is a number made up
+_BLIND = {"cameras": ""}
 Pictures = list[NDArray[np.uint8]]
 
 
@@ -107,6 +108,8 @@ def replay_one_of(
     pictures: int = 0,
     video: Path | None = None,
     said: Collection[str] = (),
+    seen: Mapping[str, Any] = _BLIND,
+    observe: Callable[[Observation], None] = lambda observation: None,
 ) -> tuple[Replay, Pictures]:
     """Run the recorded commands of an episode of an open dataset; see `replay_episode`.
 
@@ -116,6 +119,8 @@ def replay_one_of(
         pictures: how many pictures to take, evenly over the episode.
         video: also film the whole episode to this .mp4 file.
         said: names of the command line, which the dataset may name as `module:name`.
+        seen: settings of the cameras that are in the observations; none by default.
+        observe: is told the observation of every recorded frame.
     """
     info, row = dataset.info, dataset.row(episode)
     where = f"episode {episode} of {info.root}"
@@ -126,13 +131,17 @@ def replay_one_of(
     skipped = _count(row.get(TRIMMED), _MOST_TRIMMED) or 0  # the robot stood still then
     still = np.append(np.zeros(actions.shape[1] - 1), actions[0, -1]).astype(actions.dtype)
     limit = (skipped + len(actions) - 0.5) / info.fps
-    config = replace(recorded_settings(row, said), cameras="", time_limit=limit)
+    config = replace(recorded_settings(row, said), time_limit=limit, **seen)
     taken: Pictures = []
     with ExitStack() as stack:
         env = stack.enter_context(closing(build_env(config, info.fps, render=bool(pictures or video))))
         _check_state(recorded, env, where)
         film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
         moments = skipped + np.linspace(0, len(actions) - 1, pictures).round().astype(int)
+
+        def before(frame: int, observation: Observation) -> None:
+            if frame >= skipped:
+                observe(observation)
 
         def see(frame: int) -> None:
             picture = env.render() if film or frame in moments else None
@@ -142,7 +151,7 @@ def replay_one_of(
                 film.add(picture)
 
         actions = np.vstack([np.tile(still, (skipped, 1)), actions])
-        states, contacts, success = _run(env, seed, actions, info.fps, see)
+        states, contacts, success = _run(env, seed, actions, info.fps, see, before)
     states = states[skipped:]
     if not states:
         raise HandrailError(f"{where}: the task ended before the first recorded frame")
@@ -176,7 +185,12 @@ def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
 
 
 def _run(
-    env: HandrailEnv, seed: int, actions: np.ndarray, fps: float, see: Callable[[int], None]
+    env: HandrailEnv,
+    seed: int,
+    actions: np.ndarray,
+    fps: float,
+    see: Callable[[int], None],
+    before: Callable[[int, Observation], None],
 ) -> tuple[list[FloatArray], int, bool]:
     """Send the commands of an episode until it is over.
 
@@ -186,6 +200,7 @@ def _run(
         actions: velocities at the ends of the frames, and gripper, (T, n + 1).
         fps: frames a second.
         see: is told the number of every frame at its end.
+        before: is told it at the frame's beginning, with what is observed.
 
     Returns:
         The states before the frames, how many contacts began, and whether the task was done.
@@ -195,8 +210,9 @@ def _run(
     for frame in range(len(actions)):
         action = actions[frame].astype(np.float64)
         states.append(observation["agent_pos"])
-        before = np.array(env.state().commanded)
-        command = Command(np.stack([before, action[:-1], np.zeros(len(before))]), 1.0 / fps)
+        before(frame, observation)
+        last = np.array(env.state().commanded)
+        command = Command(np.stack([last, action[:-1], np.zeros(len(last))]), 1.0 / fps)
         for step in range(1, round(env.fps / fps) + 1):
             sent = np.append(command.velocity(step * env.period), action[-1])
             observation, _, terminated, truncated, info = env.step(sent)

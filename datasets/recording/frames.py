@@ -85,7 +85,7 @@ COLUMNS = (
 Policies read `observation.*` and write `action`; LeRobot leaves the rest alone.
 All numbers are finite: no tool's statistics may become NaN.
 """
-_PICTURE = "observation.images."
+PICTURE = "observation.images."
 
 
 def frame_features(
@@ -119,13 +119,13 @@ def frame_features(
         if column.parts
     }
     observed = {name: each for name, each in features.items() if name.startswith("observation.")}
-    pictures = {_PICTURE + name: Feature("video", (*image_size, 3)) for name in cameras}
+    pictures = {PICTURE + name: Feature("video", (*image_size, 3)) for name in cameras}
     return observed | pictures | features
 
 
 def frame_row(frame: Frame) -> dict[str, Any]:
     """Return a moment as a frame of `frame_features`."""
-    pictures = {_PICTURE + name: image for name, image in frame.images.items()}
+    pictures = {PICTURE + name: image for name, image in frame.images.items()}
     return {column.name: column.value(frame) for column in COLUMNS} | pictures
 
 

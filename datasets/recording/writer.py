@@ -80,13 +80,20 @@ class EpisodeWriter:
         """The row of metadata of the episode that this writer saved last."""
 
     @classmethod
-    def create(cls, root: str | Path, manifest: Manifest, overwrite: bool = False) -> Self:
+    def create(
+        cls,
+        root: str | Path,
+        manifest: Manifest,
+        overwrite: bool = False,
+        types: ColumnTypes | None = None,
+    ) -> Self:
         """Start a new dataset.
 
         Args:
             root: Its folder; must be missing or empty.
             manifest: Its schema; LeRobot's own columns (timestamp, indices) are added.
             overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
+            types: Of the extra columns; the first episode fixes them without.
         """
         layout = Layout(Path(root).expanduser().absolute())
         manifest.check()
@@ -98,7 +105,7 @@ class EpisodeWriter:
             replace(layout.manifest, manifest.to_bytes(), layout.staging)
             replace(layout.info, info_bytes(manifest, Totals()), layout.staging)
             on_error.pop_all()
-        return cls(layout, manifest, Totals(), lock, None)
+        return cls(layout, manifest, Totals(), lock, types)
 
     @classmethod
     def resume(cls, root: str | Path, manifest: Manifest, verify: bool = False) -> Self:
