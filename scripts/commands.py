@@ -154,6 +154,11 @@ GROUPS: Mapping[str, Mapping[str, Program]] = {
             "policies.imitation.config:TrainConfig",
             "scripts.policy:train",
         ),
+        "encoder": _alone(
+            "train what reads pictures for policies",
+            "policies.imitation.encoder.config:EncoderConfig",
+            "scripts.policy:train_encoder",
+        ),
         "evaluate": _alone(
             "let trained policies drive, protected and disturbed",
             "policies.imitation.evaluation.config:EvaluateConfig",

@@ -2,6 +2,7 @@
 
 from handrail.controllers.errors import FAILED
 from handrail.policies.imitation.config import TrainConfig, check_installed
+from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 
 
@@ -13,6 +14,14 @@ def train(config: TrainConfig) -> int:
 
     Terminal().print(f"written: {training.train(config)}")
     return 0
+
+
+def train_encoder(config: EncoderConfig) -> None:
+    """Train an encoder."""
+    check_installed("handrail-encoder", ("torch",))
+    from handrail.policies.imitation.encoder import training
+
+    training.train(config)
 
 
 def evaluate(config: EvaluateConfig) -> int:

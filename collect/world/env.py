@@ -198,12 +198,15 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "agent_pos": self._agent.read(self.seen[0], state.tool, state.opening),
             "environment_state": bounded(self.task.features(state)),
         }
-        cameras, size = self.cameras, self.image_size
-        if cameras and self.real:
-            observation["pixels"] = self.plant.pictures(cameras, size)
-        elif cameras:
-            observation["pixels"] = {camera: self._paint("pixels", camera, size) for camera in cameras}
+        if self.cameras:
+            observation["pixels"] = self.pictures(self.cameras)
         return observation, info
+
+    def pictures(self, cameras: tuple[str, ...]) -> dict[str, NDArray[np.uint8]]:
+        """Return what cameras see now, `image_size` each; a simulation without any needs a `render_mode`."""
+        if self.real:
+            return dict(self.plant.pictures(cameras, self.image_size))
+        return {camera: self._paint("pixels", camera, self.image_size) for camera in cameras}
 
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""

@@ -106,6 +106,8 @@ class SceneObject(FrozenArrays):
     """How it moves by itself, from `position` on; nothing stops it."""
     slide: Slide | None = None
     """The rail that it moves on, for a movable thing that is not loose."""
+    turns: int = 1
+    """It looks the same after so many-th of a turn around its z axis."""
 
     @property
     def movable(self) -> bool:

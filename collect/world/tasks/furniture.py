@@ -57,7 +57,8 @@ def table(name: str, x: float, y: float, size: tuple[float, float, float], scale
 
 def cube(name: str, x: float, y: float, bottom: float, yaw: float, edge: float, mass: float) -> SceneObject:
     """Return a cube that can be grasped, standing at height `bottom` [m], turned by `yaw` [rad]."""
-    return standing(name, box([edge] * 3), x, y, bottom, yaw, rgba=_RED, mass=mass, friction=1.0)
+    looks = {"rgba": _RED, "turns": 4}
+    return standing(name, box([edge] * 3), x, y, bottom, yaw, mass=mass, friction=1.0, **looks)
 
 
 def open_bin(

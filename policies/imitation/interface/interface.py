@@ -92,7 +92,7 @@ class PolicyInterface:
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of what the policy reads: state, environment."""
         base = BASE_SEEN if self._shows_base else ()
-        around = (f"{name}.{part}" for name, parts, _ in self._objects for part in SEEN.get(parts, parts))
+        around = (f"{name}.{part}" for name, parts, _ in self.objects for part in SEEN.get(parts, parts))
         return (*self._own, *TOOL_SEEN, *base), tuple(around)
 
     @property
@@ -111,13 +111,17 @@ class PolicyInterface:
         if state.ndim == 1:
             numbers = self.observe(state[None], environment[None])
             return numbers[0][0], numbers[1][0]
-        state, environment = np.asarray(state, float), np.asarray(environment, float)
-        pose = self._pose(state)
-        own = [self._of(state, self._own), pose.tool_seen, *([pose.base_seen] if self._shows_base else [])]
+        environment, pose = np.asarray(environment, float), self.pose(state)
         around: list[FloatArray] = [np.zeros((len(state), 0))]
-        for _, parts, start in self._objects:
+        for _, parts, start in self.objects:
             around.append(seen(parts, environment[:, start : start + len(parts)], pose))
-        return np.column_stack(own).astype(np.float32), np.column_stack(around).astype(np.float32)
+        return self.observe_robot(state), np.column_stack(around).astype(np.float32)
+
+    def observe_robot(self, state: FloatArray) -> FloatArray:
+        """Return what the policy reads of the robot itself, (T, s') float32, of recorded states, (T, s)."""
+        state, pose = np.asarray(state, float), self.pose(state)
+        own = [self._of(state, self._own), pose.tool_seen, *([pose.base_seen] if self._shows_base else [])]
+        return np.column_stack(own).astype(np.float32)
 
     def encode(self, columns: Columns) -> FloatArray:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
@@ -129,7 +133,7 @@ class PolicyInterface:
             gripper = columns[ACTION][:, -1]
             values = np.zeros((len(state), len(self.channels)))
             values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
-        pose = self._pose(state)
+        pose = self.pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
         rows = columns[MASK][:, : len(self.channels)].astype(bool)
@@ -139,7 +143,7 @@ class PolicyInterface:
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
         action, state = np.asarray(action, float), np.asarray(state, float)[None]
-        pose = self._pose(state)
+        pose = self.pose(state)
         values, count = np.zeros((1, len(self.channels))), len(self._commanded)
         values[0, self._commanded] = action[:count]
         for pair in self._pairs:
@@ -182,7 +186,7 @@ class PolicyInterface:
         return (*(f"{joint}.pos" for joint in arm), *others)
 
     @cached_property
-    def _objects(self) -> list[tuple[str, tuple[str, ...], int]]:
+    def objects(self) -> list[tuple[str, tuple[str, ...], int]]:
         """Neighbouring numbers of the environment whose names begin alike: name, parts, where they begin."""
         found: list[tuple[str, tuple[str, ...], int]] = []
         start = 0
@@ -192,8 +196,9 @@ class PolicyInterface:
             start += len(parts)
         return found
 
-    def _pose(self, state: FloatArray) -> RobotPose:
+    def pose(self, state: FloatArray) -> RobotPose:
         """Return where the robot is, from recorded states, (T, s)."""
+        state = np.asarray(state, float)
         base = np.zeros((len(state), 3))
         if self._known.base:
             base = self._of(state, [f"{joint}.pos" for joint in self._joints[:3]])

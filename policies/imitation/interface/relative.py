@@ -29,16 +29,16 @@ from scipy.spatial.transform import Rotation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import turned
 
-_POSITION = ("x", "y", "z")
-_POSE = (*_POSITION, "qw", "qx", "qy", "qz")
+POSITION = ("x", "y", "z")
+POSE = (*POSITION, "qw", "qx", "qy", "qz")
 _NEAR = (0.05, 0.25)  # r: from where on being near is told finely [m]
-_OFFSET = ("dx", "dy", "dz", *(f"near_{r:g}.{axis}" for r in _NEAR for axis in _POSITION))
+_OFFSET = ("dx", "dy", "dz", *(f"near_{r:g}.{axis}" for r in _NEAR for axis in POSITION))
 _MATRIX = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
-SEEN = {_POSE: (*_OFFSET, *_MATRIX), _POSITION: _OFFSET}
+SEEN = {POSE: (*_OFFSET, *_MATRIX), POSITION: _OFFSET}
 """The names of what a policy reads of an object, by those of its numbers; of other numbers as they are."""
-TOOL = tuple(f"tool.{part}" for part in _POSE)
+TOOL = tuple(f"tool.{part}" for part in POSE)
 """The tool's pose, as recorded."""
-TOOL_SEEN = tuple(f"tool.{part}" for part in (*_POSITION, *_MATRIX))
+TOOL_SEEN = tuple(f"tool.{part}" for part in (*POSITION, *_MATRIX))
 BASE_SEEN = ("base.x", "base.y", "base.cos", "base.sin")
 
 
@@ -94,7 +94,7 @@ def seen(parts: tuple[str, ...], numbers: FloatArray, pose: RobotPose) -> FloatA
         offset = pose.turned(numbers[:, :3] - pose.tool)
         square = np.sum(offset**2, axis=1, keepdims=True)
         found = [offset, *(offset / np.sqrt(square + r * r) for r in _NEAR)]
-        if parts == _POSE:
+        if parts == POSE:
             turn = rotations(numbers[:, 3:]) @ pose.rotation.transpose(0, 2, 1)
             found.append((pose.matrices.transpose(0, 2, 1) @ turn @ pose.matrices).reshape(-1, 9))
         return np.column_stack(found)

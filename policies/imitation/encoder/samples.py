@@ -1,0 +1,168 @@
+"""Samples that an encoder learns from: pictures, the robot's state, and the truth that it shall say.
+
+They are drawn, never stored. Of a chunk,
+
+- some are moments of episodes that a script drives, in several teleop modes: also with the cube in hand,
+- some the same moments with the robot moved a little, so that it is not always on its way,
+- some are scenes of other episodes, seen by the robot where it was in these: so that where the hand is says
+  nothing about where things are.
+"""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from handrail.collect.operators.modes import MODES
+from handrail.collect.seeds import encoder_seed
+from handrail.collect.session.build import build_env, build_session, session_features
+from handrail.collect.session.session import Session
+from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.observation import AgentObservation
+from handrail.controllers.arrays import FloatArray
+from handrail.datasets.recording.frames import Frame
+from handrail.policies.imitation.encoder.config import EncoderConfig
+from handrail.policies.imitation.encoder.encoder import Reads
+from handrail.policies.imitation.interface.interface import PolicyInterface
+
+FPS = 20
+_DRIVEN = ("ee", "direct")  # modes of the scripts
+_EPISODES = 3  # of a chunk
+_OWN, _MOVED = 0.06, 0.03  # share of an episode's frames
+_POSES = 3  # at which a scene is seen
+_AWAY = 0.1  # standard deviation by which the robot is moved [m · scale/2, rad]
+Samples = dict[str, np.ndarray]
+START, DRIVEN, MOVED, ELSEWHERE = range(4)
+"""What kind of moment a sample is, in `kind`."""
+
+
+@dataclass
+class Drawn:
+    """Chunks of samples, each from its number alone: a dataset as PyTorch has them."""
+
+    config: EncoderConfig
+
+    def __getitem__(self, chunk: int) -> Samples:
+        """Return a chunk: pictures by camera, `state`, `environment`, `kind`; (N, …) each."""
+        rng = np.random.default_rng([self.config.seed, chunk])
+        seeds = (encoder_seed(self.config.seed, chunk, number) for number in range(2**32))
+        watcher = _Watcher(self._env, self._camera_names, rng)
+        for seed in (next(seeds) for _ in range(_EPISODES)):
+            session = self._sessions[rng.integers(len(self._sessions))]
+            replace(session, observers=(watcher,)).run(seed)
+        own = len(watcher.rows)
+        while len(watcher.rows) < 2 * own:
+            self._env.reset(seed=next(seeds))
+            watcher.take(START)
+            for _ in range(_POSES - 1):
+                self._env.simulation.show(watcher.been[rng.integers(len(watcher.been))])
+                watcher.take(ELSEWHERE)
+        return {name: np.stack([row[name] for row in watcher.rows]) for name in watcher.rows[0]}
+
+    def __len__(self) -> int:
+        return 2**31
+
+    @cached_property
+    def reads(self) -> Reads:
+        """What an encoder of these reads and says."""
+        env, features = self._env, session_features(self._env)
+        interface = PolicyInterface.of_dataset(features, (), "realised")
+        env.reset(seed=0)
+        turns = {item.name: item.turns for item in env.start.scene.objects if item.turns > 1}
+        cameras = dict.fromkeys(self._camera_names, env.image_size)
+        return Reads(self.config.robot, self.config.task, cameras, interface, turns)
+
+    @property
+    def _camera_names(self) -> tuple[str, ...]:
+        return self.config.session.camera_names
+
+    @cached_property
+    def _env(self) -> HandrailEnv:
+        """It draws only the moments that are asked for."""
+        config = replace(self.config.session, cameras="")
+        return build_env(config, FPS, render=True)
+
+    @cached_property
+    def _sessions(self) -> list[Session]:
+        modes = [mode for mode in _DRIVEN if mode in MODES]
+        return [build_session(replace(self.config.session, mode=mode), self._env) for mode in modes]
+
+
+class _Watcher:
+    """Takes samples while episodes run.
+
+    Attributes:
+        rows: of the samples.
+        been: positions of the joints of all moments, (n,) each.
+    """
+
+    def __init__(self, env: HandrailEnv, cameras: tuple[str, ...], rng: np.random.Generator) -> None:
+        self._env, self._cameras, self._rng = env, cameras, rng
+        self._agent = AgentObservation(env.model)
+        self.rows: list[Samples] = []
+        self.been: list[FloatArray] = []
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take the moment at which an episode begins."""
+        self.take(START)
+
+    def see(self, frame: Frame) -> None:
+        """Take some of the moments."""
+        simulation = self._env.simulation
+        q, number = simulation.state().q.copy(), self._rng.random()
+        self.been.append(q)
+        if number < _OWN:
+            self.take(DRIVEN)
+        elif number < _OWN + _MOVED and not simulation.held():
+            before = simulation.checkpoint()
+            simulation.show(self._moved(q))
+            self.take(MOVED)
+            simulation.restore(before)
+
+    def take(self, kind: int) -> None:
+        """Take this moment."""
+        env = self._env
+        truth = env.task_state()
+        state = self._agent.read(env.state(), truth.tool, truth.opening)
+        around = np.asarray(env.task.features(truth), np.float32)
+        numbers = {"state": state, "environment": around, "kind": np.array(kind)}
+        self.rows.append(env.pictures(self._cameras) | numbers)
+
+    def _moved(self, q: FloatArray) -> FloatArray:
+        description = self._env.model.description
+        away = np.full(len(q), _AWAY)
+        away[:2] *= 0.5 * description.world.scale
+        limits = description.limits
+        moved = q + away * self._rng.normal(size=len(q))
+        return np.clip(moved, limits.position_lower, limits.position_upper)
+
+
+def batches(chunks: Iterator[Samples], size: int, reuse: float, most: int, seed: int) -> Iterator[Samples]:
+    """Yield samples in random order, from those drawn lately.
+
+    Args:
+        chunks: of samples.
+        size: of a batch.
+        reuse: how often a sample comes, on average.
+        most: samples that are kept.
+        seed: of the order.
+    """
+    kept: deque[Samples] = deque()
+    owed = 0.0
+    for number, chunk in enumerate(chunks):
+        kept.append(chunk)
+        while sum(map(_count, kept)) - _count(kept[0]) >= most:
+            kept.popleft()
+        places = [(each, row) for each in kept for row in range(_count(each))]
+        rng = np.random.default_rng([seed, number])
+        owed += reuse * _count(chunk) / size
+        while owed >= 1.0:
+            owed -= 1.0
+            chosen = [places[place] for place in rng.integers(len(places), size=size)]
+            yield {name: np.stack([each[name][row] for each, row in chosen]) for name in chunk}
+
+
+def _count(samples: Samples) -> int:
+    return len(samples["kind"])

@@ -1,0 +1,252 @@
+"""Trains an encoder on scenes that are drawn meanwhile; measures it on others."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import torch
+from rich.table import Table
+from torch import Tensor, nn
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.utils.data import DataLoader
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.interrupts import Interrupts
+from handrail.datasets.presentation.terminal import Terminal
+from handrail.policies.imitation.encoder.config import EncoderConfig
+from handrail.policies.imitation.encoder.encoder import Encoder, same
+from handrail.policies.imitation.encoder.samples import DRIVEN, START, Drawn, Samples, batches
+from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.relative import POSE, rotations
+from handrail.policies.imitation.interface.trained import threads
+
+_KEPT = 1e9  # of samples to draw from [byte]
+_WARMUP = 200  # updates
+_FALL = 0.6  # share of the updates from which on the learning rate falls, along a cosine
+_AVERAGED = 0.998  # of the weights, an update
+_MEASURED = 2**31  # number of the first chunk that is only measured on
+_CHUNKS = 6
+_SAVED = 200  # updates
+_SHIFT = 0.02  # of a picture's height: by so much it is shifted at most
+
+
+def train(config: EncoderConfig) -> None:
+    """Train an encoder, or go on with it, and print how far off it is."""
+    config.check()
+    with threads(config.threads), Interrupts() as interrupts, interrupts.deferred():
+        training = _Training(config)
+        console = Terminal(stderr=True)
+        for update in training.updates():
+            if update % _SAVED == 0 or interrupts.asked or update == config.updates:
+                training.save()
+                console.print(f"update {update} of {config.updates}: loss {training.loss:.3f}")
+            if interrupts.asked:
+                raise KeyboardInterrupt
+        encoder = training.encoder
+        encoder.save(config.file)
+    measured = Encoder.load(config.file)
+    Terminal().print(error_table(errors(measured, _chunks(config, _MEASURED, _MEASURED + _CHUNKS))))
+    Terminal().print(f"written: {config.output}")
+
+
+def errors(encoder: Encoder, chunks: Iterator[Samples]) -> dict[str, dict[str, FloatArray]]:
+    """Return how far off an encoder is, by object and quantity, at starts and on the way; without memory.
+
+    `START` and `DRIVEN` moments alone: the others are for learning.
+    """
+    found: dict[str, dict[str, list[FloatArray]]] = {}
+    for chunk in chunks:
+        pictures = {name: _tensor(chunk[name]) for name in encoder.reads.cameras}
+        said = encoder.look(pictures, chunk["state"])
+        for name, parts, start in encoder.reads.objects:
+            truth = chunk["environment"][:, start : start + len(parts)].astype(float)
+            off = {"position": np.linalg.norm(said[name].position - truth[:, :3], axis=1)}
+            if (turned := said[name].rotation) is not None:
+                apart = same(encoder.reads.turns.get(name, 1))
+                ways = np.einsum("tij,kjl->ktil", rotations(truth[:, 3:]), apart)
+                trace = np.einsum("ktij,tij->kt", ways, turned).max(0)
+                off["rotation"] = np.degrees(np.arccos(np.clip((trace - 1) / 2, -1, 1)))
+            for moment, kind in (("start", START), ("under way", DRIVEN)):
+                for what, values in off.items():
+                    rows = found.setdefault(name, {}).setdefault(f"{what} {moment}", [])
+                    rows.append(values[chunk["kind"] == kind])
+    return {name: {what: np.concatenate(each) for what, each in of.items()} for name, of in found.items()}
+
+
+def error_table(found: Mapping[str, Mapping[str, FloatArray]]) -> Table:
+    """Return how far off an encoder is as a table."""
+    table = Table("object", "", "median", "90 %", "moments", title="How far off, on scenes of its own")
+    for name, quantities in found.items():
+        for what, values in quantities.items():
+            unit, factor = ("°", 1.0) if what.startswith("rotation") else (" cm", 100.0)
+            numbers = [f"{factor * np.quantile(values, share):.1f}{unit}" for share in (0.5, 0.9)]
+            table.add_row(name, what, *numbers, str(len(values)))
+    return table
+
+
+class _Training:
+    """A training, new or begun.
+
+    Attributes:
+        loss: of lately.
+    """
+
+    def __init__(self, config: EncoderConfig) -> None:
+        self._config = config
+        drawn = Drawn(config)
+        torch.manual_seed(config.seed)
+        self._encoder = Encoder(drawn.reads)
+        network = self._encoder.network
+        self._averaged = AveragedModel(network, multi_avg_fn=get_ema_multi_avg_fn(_AVERAGED))
+        self._optimizer = torch.optim.AdamW(network.parameters(), config.lr, weight_decay=1e-4, fused=True)
+        self._draft = config.file.with_suffix(".training")
+        self._update, self._chunk, self.loss = 0, 0, math.nan
+        if config.overwrite:
+            self._draft.unlink(missing_ok=True)
+        if self._draft.is_file():
+            self._load()
+        else:
+            chunk = drawn[_MEASURED - 1]
+            seen = drawn.reads.interface.observe_robot(chunk["state"])
+            network.mean.copy_(torch.from_numpy(seen.mean(0)))
+            network.spread.copy_(torch.from_numpy(np.maximum(seen.std(0), 1e-2)))
+
+    @property
+    def encoder(self) -> Encoder:
+        """The encoder with the weights' average of lately."""
+        return Encoder(self._encoder.reads, self._averaged.module)  # pyright: ignore[reportArgumentType]
+
+    def updates(self) -> Iterator[int]:
+        """Make every update that is left, and yield its number."""
+        config, network = self._config, self._encoder.network
+        size = sum(3 * h * w for h, w in self._encoder.reads.cameras.values())
+        drawn = self._counted(_chunks(config, self._chunk, 2**30))
+        samples = batches(drawn, config.batch_size, config.reuse, round(_KEPT / size), config.seed)
+        rng = np.random.default_rng([config.seed, self._chunk, 1])
+        while self._update < config.updates:
+            batch = next(samples)
+            for group in self._optimizer.param_groups:
+                group["lr"] = config.lr * _rate(self._update, config.updates)
+            network.train()
+            loss = _loss(self._encoder, batch, rng)
+            self._optimizer.zero_grad(set_to_none=True)
+            loss.backward()
+            nn.utils.clip_grad_norm_(network.parameters(), 10.0)
+            self._optimizer.step()
+            self._averaged.update_parameters(network)
+            self._update += 1
+            self.loss = 0.98 * self.loss + 0.02 * loss.item() if math.isfinite(self.loss) else loss.item()
+            if not math.isfinite(self.loss):
+                raise HandrailError(f"encoder: expected a finite loss, got {self.loss} at {self._update}")
+            yield self._update
+
+    def _counted(self, chunks: Iterator[Samples]) -> Iterator[Samples]:
+        for chunk in chunks:
+            self._chunk += 1
+            yield chunk
+
+    def save(self) -> None:
+        """Keep where the training stands."""
+        parts = self._encoder.network, self._averaged, self._optimizer
+        content = {"settings": self._settings, "at": (self._update, self._chunk)}
+        temporary = self._draft.with_suffix(".partial")
+        torch.save(content | {"parts": [part.state_dict() for part in parts]}, temporary)
+        temporary.replace(self._draft)
+
+    def _load(self) -> None:
+        try:
+            content = torch.load(self._draft, weights_only=True)
+        except Exception as error:  # of PyTorch: whatever the file holds, it is refused
+            raise HandrailError(f"{str(self._draft)!r}: {message_of(error)}; say --overwrite") from error
+        if content["settings"] != self._settings:
+            raise HandrailError(f"{str(self._draft)!r}: was begun with other settings; say --overwrite")
+        for part, state in zip(
+            (self._encoder.network, self._averaged, self._optimizer), content["parts"], strict=True
+        ):
+            part.load_state_dict(state)
+        self._update, self._chunk = content["at"]
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        free = ("output", "workers", "threads", "overwrite")
+        return {name: value for name, value in asdict(self._config).items() if name not in free}
+
+
+def _chunks(config: EncoderConfig, first: int, end: int) -> Iterator[Samples]:
+    """Yield chunks in order, however many processes draw them."""
+    around: dict[str, Any] = {"multiprocessing_context": "forkserver", "prefetch_factor": 2}
+    loader = DataLoader(
+        Drawn(config),  # pyright: ignore[reportArgumentType]
+        batch_size=None,
+        sampler=range(first, end),
+        num_workers=config.workers,
+        collate_fn=_as_they_are,  # pyright: ignore[reportArgumentType]
+        **(around if config.workers else {}),
+    )
+    return iter(loader)
+
+
+def _as_they_are(samples: Samples) -> Samples:
+    return samples
+
+
+def _rate(update: int, updates: int) -> float:
+    """Return the share of the highest learning rate at an update."""
+    fallen = max(0.0, (update / updates - _FALL) / (1.0 - _FALL))
+    return min(1.0, (update + 1) / _WARMUP) * max(0.01, 0.5 * (1.0 + math.cos(math.pi * fallen)))
+
+
+def _tensor(pictures: np.ndarray) -> Tensor:
+    return torch.from_numpy(pictures).permute(0, 3, 1, 2) / 255.0
+
+
+def _loss(encoder: Encoder, batch: Samples, rng: np.random.Generator) -> Tensor:
+    """Return `Σ ‖e‖ / b + 3 log b` over the objects, of their places and turns, a mean over the batch."""
+    pictures = {name: _disturbed(_tensor(batch[name]), rng) for name in encoder.reads.cameras}
+    interface = encoder.reads.interface
+    state = batch["state"]
+    numbers = encoder.network(pictures, torch.from_numpy(interface.observe_robot(state)))
+    loss, start = numbers.new_zeros(()), 0
+    for name, parts, first in encoder.reads.objects:
+        truth = batch["environment"][:, first : first + len(parts)].astype(float)
+        place, ways = _targets(interface, state, truth, parts, encoder.reads.turns.get(name, 1))
+        d, b = numbers[:, start : start + 3], numbers[:, start + 3]
+        start += 4
+        loss = loss + _surprise((d - place).norm(dim=1), b)
+        if ways is not None:
+            m, r = numbers[:, start : start + 6], numbers[:, start + 6]
+            start += 7
+            loss = loss + _surprise((m[None] - ways).norm(dim=2).amin(0), r)
+    return loss
+
+
+def _targets(
+    interface: PolicyInterface, state: FloatArray, truth: FloatArray, parts: tuple[str, ...], turns: int
+) -> tuple[Tensor, Tensor | None]:
+    """Return what shall be said of an object: d, (T, 3), and M in all ways that look the same, (k, T, 6)."""
+    pose = interface.pose(state)
+    place = torch.from_numpy(pose.turned(truth[:, :3] - pose.tool)).float()
+    if parts != POSE:
+        return place, None
+    turned = pose.matrices.transpose(0, 2, 1) @ rotations(truth[:, 3:])
+    ways = np.einsum("tij,kjl->ktil", turned, same(turns))[..., :2]
+    return place, torch.from_numpy(ways.swapaxes(2, 3).reshape(*ways.shape[:2], 6)).float()
+
+
+def _surprise(off: Tensor, width: Tensor) -> Tensor:
+    """Return the mean of `‖e‖ / b + 3 log b`, `b = e^width`; what is known badly counts less, by √b."""
+    width = width.clamp(-6.0, 3.0)
+    return ((off / width.exp() + 3.0 * width) * width.detach().exp().sqrt()).mean()
+
+
+def _disturbed(pictures: Tensor, rng: np.random.Generator) -> Tensor:
+    """Return pictures shifted a little, brighter or darker."""
+    most = round(_SHIFT * pictures.shape[2])
+    down, right = rng.integers(-most, most + 1, 2).tolist()
+    shape = (len(pictures), 1, 1, 1)
+    gain = torch.from_numpy(rng.uniform(0.8, 1.2, shape)).float()
+    lift = torch.from_numpy(rng.uniform(-0.1, 0.1, shape)).float()
+    return (torch.roll(pictures, (down, right), (2, 3)) * gain + lift).clamp(0.0, 1.0)
