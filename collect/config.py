@@ -62,6 +62,8 @@ class SessionConfig:
     """Cameras of the robot to record, such as front,wrist; scene overlooks it; all, or none by default."""
     image_size: Advanced[int | str] = 128
     """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
+    randomise: bool = False
+    """Draw light, colours, textures, camera poses and fields of view anew in each episode, from its seed."""
     realtime: Advanced[bool] = False
     """Pace the loop by the wall clock."""
     physics: Advanced[bool] = True
@@ -109,9 +111,9 @@ class SessionConfig:
         if self.moving_obstacles and not TASKS.find(self.task).movers:
             fit = " or ".join(spec.name for spec in TASKS.built_in if spec.movers)
             raise HandrailError(f"--moving_obstacles: expected --task {fit}, got --task {self.task}")
-        if not self.physics and (self.task != "reach" or self.camera_names):
+        if not self.physics and (self.task != "reach" or self.camera_names or self.randomise):
             raise HandrailError(
-                "--no_physics: expected --task reach without cameras: nothing can be moved or seen"
+                "--no_physics: expected --task reach without cameras or --randomise: nothing moves or is seen"
             )
 
 
@@ -213,10 +215,9 @@ class RecordConfig(SessionConfig, ExecutionConfig):
         self.cockpit.check()
         self.teleop.check(self.operator)
         self.client.check(self.robot_client, self.operator)
-        if self.robot_client and (self.moving_obstacles or not self.physics):
-            raise HandrailError(
-                f"--robot_client {self.robot_client}: expected neither --moving_obstacles nor --no_physics"
-            )
+        if self.robot_client and (self.moving_obstacles or self.randomise or not self.physics):
+            words = "expected none of --moving_obstacles, --randomise, --no_physics"
+            raise HandrailError(f"--robot_client {self.robot_client}: {words}")
         self._check_rates()
         self._check_sharing()
         for one, other in (("resume", "overwrite"), ("display_data", "display_web")):

@@ -58,6 +58,8 @@ class RenderConfig(EditConfig):
     """Cameras of the robot, such as front,wrist; scene overlooks it; or all."""
     image_size: int | str = SessionConfig.image_size
     """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
+    randomise: bool = False
+    """Draw light, colours, textures, cameras anew in each episode, even if none of it was when recorded."""
 
     def check(self) -> None:
         """Check what can be checked without reading anything."""

@@ -36,6 +36,7 @@ def render(config: RenderConfig) -> None:
     check_whole(config.root, config.verify)
     with open_dataset(config.root) as dataset:
         seen = {"cameras": config.cameras, "image_size": config.image_size}
+        seen |= {"randomise": True} if config.randomise else {}
         for row in dataset.rows:
             replace(recorded_settings(row), **seen).check()
         with _writer(config, dataset) as writer:
@@ -57,8 +58,8 @@ def _writer(config: RenderConfig, dataset: OpenDataset) -> Iterator[EpisodeWrite
     name = config.name or manifest.repo_id
     manifest = replace(manifest, repo_id=name, features=observed | cameras | numbers)
     if is_dataset(target):
-        begun = [row.get("seed") for row in read_episodes(target.root)]
-        if begun != [row.get("seed") for row in dataset.rows][: len(begun)]:
+        begun = [_kind(row, False) for row in read_episodes(target.root)]
+        if begun != [_kind(row, config.randomise) for row in dataset.rows][: len(begun)]:
             raise HandrailError(f"--output {config.output}: expected episodes of {config.root}, found others")
         writer = EpisodeWriter.resume(target.root, manifest)
     else:
@@ -68,6 +69,11 @@ def _writer(config: RenderConfig, dataset: OpenDataset) -> Iterator[EpisodeWrite
             yield writer
         finally:
             writer.erase_if_empty()
+
+
+def _kind(row: Mapping[str, Any], randomise: bool) -> tuple[Any, bool]:
+    """Return what says whether an episode is another's: its seed, and whether its looks are drawn."""
+    return row.get("seed"), randomise or recorded_settings(row).randomise
 
 
 def _one_robot(dataset: OpenDataset) -> str:

@@ -15,6 +15,7 @@ from handrail.collect.session.mode_controller import ModeController
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.world.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
+from handrail.collect.world.looks import Looks
 from handrail.collect.world.plant import Plant
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Task
@@ -37,6 +38,7 @@ def build_env(
     render: tuple[int, int] | bool = False,
     shift: float = 0.0,
     plant: Callable[..., Plant] | None = None,
+    moved: float = 0.0,
 ) -> HandrailEnv:
     """Return the environment of a session.
 
@@ -46,6 +48,7 @@ def build_env(
         render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
         shift: how far from the demonstrations' start the robot begins at most [m, rad].
         plant: makes a robot that is no simulation.
+        moved: how far the cameras are away from their places, times 2 cm and 3°.
     """
     config.check()
     check_fps(fps)
@@ -61,6 +64,7 @@ def build_env(
         render_mode="rgb_array" if render else None,
         render_size=render if isinstance(render, tuple) else RENDER_SIZE,
         sample=partial(sample_shifted, task, shift) if shift else None,
+        looks=Looks(config.randomise, moved),
     )
 
 

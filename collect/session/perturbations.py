@@ -1,4 +1,4 @@
-"""What may disturb an episode: pushes, a start elsewhere, late observations. Light to import.
+"""What may disturb an episode: pushes, a start elsewhere, late observations, moved cameras. Light to import.
 
 All of it is drawn from the episode's seed and from nothing that the robot does, so that whoever runs the same
 seed meets the same disturbance.
@@ -14,8 +14,8 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.typed import check_settings
 
 NONE = "none"
-DEFAULTS: Mapping[str, float] = {"push": 1.0, "shift": 0.3, "delay": 3}
-_WORDS = {"push": "pushed", "shift": "shifted", "delay": "delayed"}
+DEFAULTS: Mapping[str, float] = {"push": 1.0, "shift": 0.3, "delay": 3, "camera": 1.0}
+_WORDS = {"push": "pushed", "shift": "shifted", "delay": "delayed", "camera": "camera moved"}
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class Perturbation:
     shift: Annotated[float, Meta(ge=0, le=2)] = 0.0
     """How far from the demonstrations' start the robot begins at most [m, rad]."""
     delay: Annotated[int, Meta(ge=0, le=100)] = 0  # control periods by which observations come late
+    camera: Annotated[float, Meta(ge=0, le=10)] = 0.0  # each is moved by 2 cm and turned by 3°, times this
 
     def __post_init__(self) -> None:
         """Check the sizes."""

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
+from handrail.collect.world.looks import Looks
 from handrail.collect.world.observation import AgentObservation, bounded, box_space
 from handrail.collect.world.plant import Plant
 from handrail.collect.world.rendering import Painter
@@ -43,6 +44,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: `rgb_array` or None.
         render_size: height and width of what `render` returns [px].
         sample: draws how an episode begins, `(model, rng)`, instead of the task.
+        looks: what of a simulation's looks is drawn anew in each episode.
         real: whether a step takes its time, as of a robot that is no simulation: there is no way back.
 
     Attributes:
@@ -68,6 +70,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: str | None = None,
         render_size: tuple[int, int] = RENDER_SIZE,
         sample: Callable[[RobotModel, np.random.Generator], Start] | None = None,
+        looks: Looks = Looks(),  # noqa: B008  (frozen)
         real: bool = False,
     ) -> None:
         if not 10 <= fps <= 100:
@@ -84,7 +87,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
-        self._build = plant
+        self._build, self._looks = plant, looks
         self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)
         self.agent_names, self.state_names = self._agent.names, self.task.state_names
@@ -164,6 +167,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         start: Start = (options or {}).get("start") or self._sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
         plant = self._build(self.model, start.scene, start.q, self.period, meshes=meshes, grip=start.grip)
+        if meshes and isinstance(plant, Simulation):
+            plant.dress(self._looks, self.np_random.spawn(1)[0])  # which draws nothing from it
         self._begun, self._steps = (start, plant), 0
         rest = np.append(np.zeros(self.model.size), float(start.grip is not None))
         return self._shown(self.task_state(), rest.astype(np.float32))

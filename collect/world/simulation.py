@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.world.contacts import Contacts
 from handrail.collect.world.gl import MjSpec, mujoco
 from handrail.collect.world.gripper import FINGERS
+from handrail.collect.world.looks import Looks
 from handrail.collect.world.plant import Gate, Plant
 from handrail.collect.world.robot import BASE_BODY, build_robot, grasp_geoms
 from handrail.collect.world.scene import Scene
@@ -101,6 +102,11 @@ class Simulation(Plant):
         self._patrols = [(int(compiled.body(name).mocapid[0]), patrol) for name, patrol in moving]
         self._bodies = {item.name: int(compiled.body(item.name).id) for item in self._scene.objects}
         self._speeds = {item.name: self.data.joint(item.name).qvel for item in self._scene.movables}
+
+    def dress(self, looks: Looks, rng: np.random.Generator) -> None:
+        """Draw how it looks, before its first picture; it has to have meshes."""
+        looks.apply(self.mujoco_model, self._scene, rng)
+        mujoco.mj_camlight(self.mujoco_model, self.data)
 
     def show(self, q: FloatArray) -> None:
         """Put the robot at q, (n,), at rest, for a picture; no time passes."""

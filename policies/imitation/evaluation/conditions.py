@@ -253,6 +253,9 @@ def _condition(
     perturbation: Perturbation, protection: str, checkpoint: Checkpoint, config: EvaluateConfig
 ) -> PolicyCondition:
     meta, mode = checkpoint.meta, checkpoint.meta.intent_mode
+    if perturbation.camera and not checkpoint.pictures:
+        words = f"expected a policy that sees pictures; {checkpoint.folder} reads none"
+        raise HandrailError(f"--perturbation {perturbation.text}: {words}")
     own = own_protection(mode)
     chosen = own if protection == "own" else protection
     if mode and chosen not in (own, "none"):

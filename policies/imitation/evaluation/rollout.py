@@ -15,6 +15,7 @@ from handrail.collect.operators.operator import View
 from handrail.collect.session.build import build_controller, build_env
 from handrail.collect.session.disturbances import DelayedOperator, Pusher
 from handrail.collect.session.outcome import Outcome
+from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.arrays import FloatArray
@@ -163,7 +164,7 @@ def run_rollout(
     """
     checkpoint, perturbation = condition.checkpoint, condition.perturbation
     meta = checkpoint.meta
-    env = _env(_session_config(condition), meta.fps, perturbation.shift, render)
+    env = _env(_session_config(condition), meta.fps, perturbation, render)
     controller = _controller(condition.protection, meta.intent_mode, meta.environment, env)
     policy = _policy(checkpoint.folder, checkpoint.digest, load)
     channels = Channels.of(env.model.description)
@@ -196,9 +197,11 @@ def _session_config(condition: PolicyCondition) -> SessionConfig:
 
 
 @lru_cache(maxsize=8)
-def _env(config: SessionConfig, fps: int, shift: float, render: tuple[int, int] | bool) -> HandrailEnv:
+def _env(
+    config: SessionConfig, fps: int, perturbation: Perturbation, render: tuple[int, int] | bool
+) -> HandrailEnv:
     """Return an environment, built once a process."""
-    return build_env(config, fps, render, shift)
+    return build_env(config, fps, render, perturbation.shift, moved=perturbation.camera)
 
 
 @lru_cache(maxsize=8)
