@@ -37,6 +37,8 @@ class TrainConfig:
     """Let the policy see where the base is, as operators do who plan where to stand."""
     images: bool = False
     """Let the policy see the cameras too."""
+    encoder: str = ""
+    """Let an encoder say from the pictures where things are: its name, or a file of handrail-encoder."""
     scene: Advanced[bool] = True
     """Let the policy see where things are; with --no_scene it has to find them in the pictures."""
     mode: str = ""
@@ -92,6 +94,9 @@ class TrainConfig:
             raise HandrailError("--patience: expected --eval_split too, the share of episodes to measure on")
         if not self.scene and not self.images:
             raise HandrailError("--no_scene: expected --images too, else the policy sees nothing of its task")
+        if self.encoder and (self.images or not self.scene or self.actions == "recorded"):
+            words = "expected neither --images nor --no_scene nor --actions recorded beside it"
+            raise HandrailError(f"--encoder: {words}; it takes the place of where things are")
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
         self.options()

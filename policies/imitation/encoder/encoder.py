@@ -5,11 +5,10 @@ Of every object whose pose or position the environment's state has, the network 
     d = R_wbᵀ (p_o − p_t)    where it is from the tool [m], (3,)      b     how far that is off [m]
     M = R_wbᵀ R_o            how it is turned, two columns, (6,)      b_r   how far that is off
 
-What it has said before is remembered, in the world's axes: `x ← (λ w x + v y) / (λ w + v)` with the weight
-`v = 1 / b²` of what it says now and `w ← λ w + v` of all before; what is far from that begins anew.
 Other numbers of the environment's state, such as obstacles on the floor, stay zero: nothing is there.
 """
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -25,17 +24,16 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.controllers.typed import Count, Name, decoded
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.encoder.network import Network
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.relative import POSE, POSITION, RobotPose
 
-_KEPT = 0.9  # λ, a frame
-_SURPRISE = 4.0  # of what is expected to be off: from there on it begins anew
 _FINEST = 2e-3  # b and b_r are at least that [m, 1]
 _SAID = {POSITION: 4, POSE: 11}  # numbers that the network says: d, b; and M, b_r
+OWN = Path(__file__).parent / "weights"
 FORMAT = "handrail.encoder/1"
 
 
@@ -91,7 +89,6 @@ class Encoder:
         self.reads = reads
         self.network = network or Network(heights, len(state), reads.size)
         self.network.eval()
-        self.forget()
 
     @classmethod
     def load(cls, path: Path) -> "Encoder":
@@ -118,35 +115,37 @@ class Encoder:
 
     def save(self, path: Path) -> None:
         """Write the encoder to a file, its weights as float16."""
+        write_whole(path, self._bytes)
+
+    @property
+    def _bytes(self) -> bytes:
         weights = {name: each.half().contiguous() for name, each in self.network.state_dict().items()}
-        write_whole(path, save(weights, {FORMAT: json.dumps(asdict(self.reads))}))
+        return save(weights, {FORMAT: json.dumps(asdict(self.reads))})
 
-    def forget(self) -> None:
-        """Forget what was seen: an episode begins."""
-        self._known: dict[str, _Known] = {}
+    @cached_property
+    def digest(self) -> str:
+        """What tells it apart from others."""
+        return hashlib.sha256(self._bytes).hexdigest()[:16]
 
-    def read(self, pictures: Mapping[str, NDArray[np.uint8]], states: FloatArray) -> FloatArray:
-        """Return the environment's state at moments that follow each other, (T, e) float32.
+    def look(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor], states: FloatArray) -> dict[str, Said]:
+        """Return what the pictures of T moments say, by object.
 
         Args:
-            pictures: by camera, (T, height, width, 3) each.
+            pictures: by camera, of 0 to 255, (T, height, width, 3); or of 0 to 1, (T, 3, height, width).
             states: of the robot, as recorded, (T, s).
         """
-        tensors = {}
+        interface, tensors = self.reads.interface, dict[str, Tensor]()
         for name, size in self.reads.cameras.items():
             given = pictures.get(name)
-            if given is None or given.shape[1:] != (*size, 3):
-                got = "none" if given is None else f"{given.shape[2]} x {given.shape[1]}"
-                words = f"expected pictures of camera {name}, {size[1]} x {size[0]} pixels, got {got}"
-                raise HandrailError(f"encoder: {words}")
-            tensors[name] = torch.from_numpy(np.ascontiguousarray(given)).permute(0, 3, 1, 2) / 255.0
-        return self.remembered(self.look(tensors, states), len(states))
-
-    def look(self, pictures: Mapping[str, Tensor], states: FloatArray) -> dict[str, Said]:
-        """Return what the pictures of T moments say, by object, without any memory."""
-        interface = self.reads.interface
+            if isinstance(given, np.ndarray):
+                given = torch.from_numpy(np.ascontiguousarray(given)).movedim(-1, 1) / 255.0
+            if given is None or tuple(given.shape[1:]) != (3, *size):
+                got = "none" if given is None else f"some of shape {tuple(given.shape[1:])}"
+                words = f"expected pictures of camera {name}, {size[1]} x {size[0]} pixels"
+                raise HandrailError(f"encoder: {words}, got {got}")
+            tensors[name] = given
         with torch.inference_mode():
-            numbers = self.network(pictures, torch.from_numpy(interface.observe_robot(states)))
+            numbers = self.network(tensors, torch.from_numpy(interface.observe_robot(states)))
         return self.said(numbers.double().numpy(), interface.pose(states))
 
     def said(self, numbers: FloatArray, pose: RobotPose) -> dict[str, Said]:
@@ -161,46 +160,14 @@ class Encoder:
                 found[name] = Said(place, widths(b[:, 0]), pose.matrices @ orthonormal(m), widths(r[:, 0]))
         return found
 
-    def remembered(self, said: Mapping[str, Said], count: int) -> FloatArray:
-        """Return the environment's state of T moments, (T, e) float32; what is said is remembered."""
-        rows = np.zeros((count, len(self.reads.interface.environment_names)), np.float32)
-        for name, parts, start in self.reads.objects:
-            known = self._known.setdefault(name, _Known(self.reads.turns.get(name, 1)))
-            for row, moment in zip(rows, range(count), strict=True):
-                row[start : start + len(parts)] = known.take(said[name], moment)
-        return rows
 
-
-class _Known:
-    """What is known of an object, from all that was said.
-
-    Args:
-        turns: it looks the same after so many-th of a turn around its z axis.
-    """
-
-    def __init__(self, turns: int) -> None:
-        self._same = same(turns)
-        self._weight, self._place = 0.0, np.zeros(3)
-        self._turn_weight, self._turn = 0.0, np.eye(3)
-
-    def take(self, said: Said, moment: int) -> FloatArray:
-        """Take what is said at a moment; return position, and quaternion if it has one, (3,) or (7,)."""
-        place, off = said.position[moment], said.off[moment]
-        surprise = np.linalg.norm(place - self._place)
-        if self._weight and surprise > _SURPRISE * np.hypot(off, self._weight**-0.5):
-            self._weight = self._turn_weight = 0.0
-        before, now = _KEPT * self._weight, off**-2.0
-        self._weight = before + now
-        self._place = (before * self._place + now * place) / self._weight
-        if said.rotation is None or said.turned_off is None:
-            return self._place
-        ways = said.rotation[moment] @ self._same
-        turn = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]
-        before, now = _KEPT * self._turn_weight, said.turned_off[moment] ** -2.0
-        self._turn_weight = before + now
-        mixed = Rotation.from_matrix(np.stack([self._turn, turn])).mean([before, now])
-        self._turn = mixed.as_matrix()
-        return np.append(self._place, mixed.as_quat(canonical=True, scalar_first=True))
+def find_encoder(name: str) -> Encoder:
+    """Return an encoder by its name, or from its file."""
+    own = {path.stem: path for path in sorted(OWN.glob("*.safetensors"))}
+    path = own.get(name) or Path(name).expanduser()
+    if not path.is_file():
+        raise unknown_name("encoder", name, [*own, "a file of handrail-encoder"])
+    return Encoder.load(path)
 
 
 def same(turns: int) -> FloatArray:

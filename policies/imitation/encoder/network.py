@@ -16,6 +16,7 @@ _FEATURES = 32  # k, of an eye
 _HIDDEN = 256
 _SMALL = 160  # pictures up to this height are halved once less [px]
 _LARGE = 300  # from this height on an eye has half the channels [px]
+_HALVES = bool(getattr(torch.cpu, "get_capabilities", dict)().get("amx_bf16"))  # half the time
 
 
 class Eye(nn.Module):
@@ -40,7 +41,9 @@ class Eye(nn.Module):
 
     def forward(self, pictures: Tensor) -> Tensor:
         """Return what there is and where, (B, 4 k), in pictures from −1 to 1, (B, 3, height, width)."""
-        found = self.look(pictures)
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.training and _HALVES):
+            found = self.look(pictures)
+        found = found.float()  # places are finer than bfloat16
         weights = (self.sharpness * found.flatten(2)).softmax(-1)
         rows, columns = (torch.linspace(-1.0, 1.0, size, device=found.device) for size in found.shape[2:])
         grid = torch.stack(torch.meshgrid(columns, rows, indexing="xy"), -1).flatten(0, 1)

@@ -59,8 +59,7 @@ def errors(encoder: Encoder, chunks: Iterator[Samples]) -> dict[str, dict[str, F
     """
     found: dict[str, dict[str, list[FloatArray]]] = {}
     for chunk in chunks:
-        pictures = {name: _tensor(chunk[name]) for name in encoder.reads.cameras}
-        said = encoder.look(pictures, chunk["state"])
+        said = encoder.look({name: chunk[name] for name in encoder.reads.cameras}, chunk["state"])
         for name, parts, start in encoder.reads.objects:
             truth = chunk["environment"][:, start : start + len(parts)].astype(float)
             off = {"position": np.linalg.norm(said[name].position - truth[:, :3], axis=1)}
@@ -199,13 +198,9 @@ def _rate(update: int, updates: int) -> float:
     return min(1.0, (update + 1) / _WARMUP) * max(0.01, 0.5 * (1.0 + math.cos(math.pi * fallen)))
 
 
-def _tensor(pictures: np.ndarray) -> Tensor:
-    return torch.from_numpy(pictures).permute(0, 3, 1, 2) / 255.0
-
-
 def _loss(encoder: Encoder, batch: Samples, rng: np.random.Generator) -> Tensor:
     """Return `Σ ‖e‖ / b + 3 log b` over the objects, of their places and turns, a mean over the batch."""
-    pictures = {name: _disturbed(_tensor(batch[name]), rng) for name in encoder.reads.cameras}
+    pictures = {name: _disturbed(batch[name], rng) for name in encoder.reads.cameras}
     interface = encoder.reads.interface
     state = batch["state"]
     numbers = encoder.network(pictures, torch.from_numpy(interface.observe_robot(state)))
@@ -242,11 +237,10 @@ def _surprise(off: Tensor, width: Tensor) -> Tensor:
     return ((off / width.exp() + 3.0 * width) * width.detach().exp().sqrt()).mean()
 
 
-def _disturbed(pictures: Tensor, rng: np.random.Generator) -> Tensor:
-    """Return pictures shifted a little, brighter or darker."""
-    most = round(_SHIFT * pictures.shape[2])
-    down, right = rng.integers(-most, most + 1, 2).tolist()
-    shape = (len(pictures), 1, 1, 1)
-    gain = torch.from_numpy(rng.uniform(0.8, 1.2, shape)).float()
-    lift = torch.from_numpy(rng.uniform(-0.1, 0.1, shape)).float()
-    return (torch.roll(pictures, (down, right), (2, 3)) * gain + lift).clamp(0.0, 1.0)
+def _disturbed(pictures: np.ndarray, rng: np.random.Generator) -> Tensor:
+    """Return pictures from 0 to 1, (B, 3, height, width), shifted a little, brighter or darker."""
+    most, shape = round(_SHIFT * pictures.shape[1]), (len(pictures), 1, 1, 1)
+    gain, lift = rng.uniform(0.8, 1.2, shape) / 255.0, rng.uniform(-0.1, 0.1, shape)
+    shifted = torch.roll(torch.from_numpy(pictures), rng.integers(-most, most + 1, 2).tolist(), (1, 2))
+    numbers = shifted.movedim(-1, 1).to(torch.float32, memory_format=torch.contiguous_format)
+    return numbers.mul_(torch.from_numpy(gain).float()).add_(torch.from_numpy(lift).float()).clamp_(0, 1)

@@ -89,6 +89,7 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     MODES.admit(meta.mode, (config.mode,))
     ROBOTS.admit(meta.robot, (config.robot,))
     sizes, pictures = _features(settings, where)
+    pictures |= meta.cameras
     if meta.interface is None:
         robot = meta.robot if meta.robot in ROBOTS else config.robot
         task = meta.environment if meta.environment in TASKS else config.task

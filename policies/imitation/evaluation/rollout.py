@@ -26,6 +26,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
+from handrail.policies.imitation.encoder.memory import Memory
 from handrail.policies.imitation.evaluation.conditions import (
     Checkpoint,
     PolicyCondition,
@@ -89,18 +90,26 @@ class PolicyOperator:
     ) -> None:
         self._policy, self._interface, self._mode, self._task = policy, interface, mode, task
         self._unusable = Intent(np.full(channels.size, np.nan), np.ones(channels.size, bool))
+        self._memory = Memory(policy.encoder.reads) if policy.encoder else None
         self.malformed = 0
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
         self._policy.reset()
+        if self._memory:
+            self._memory.forget()
         self.malformed = 0
 
     def act(self, view: View) -> Intent:
         """Return the intent now."""
         seen = view.observation
-        observed = self._interface.observe(seen["agent_pos"], seen["environment_state"])
-        action = np.asarray(self._policy.act(*observed, seen.get("pixels", {}), self._task))
+        state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
+        if self._memory and self._policy.encoder:
+            seen_now = {name: each[None] for name, each in pictures.items()}
+            said = self._policy.encoder.look(seen_now, state[None])
+            around = self._memory.take(said, 0)
+        observed = self._interface.observe(state, around)
+        action = np.asarray(self._policy.act(*observed, pictures, self._task))
         if action.shape == (len(self._interface.action_names),) and np.all(np.isfinite(action)):
             intent = self._interface.decode(action, seen["agent_pos"])
         else:

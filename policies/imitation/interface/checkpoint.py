@@ -85,6 +85,8 @@ class PolicyMeta:
     """Digest of what it learnt from."""
     time_limit: Annotated[float, Meta(ge=0, le=MOST_TIME)] = 0.0
     """That its episodes had at most [s]; 0 if that was the task's own, or they do not say."""
+    cameras: Mapping[Name, tuple[Count, Count]] = field(default_factory=dict)
+    """Height and width of the pictures that its encoder reads [px], by camera."""
     validation: Mapping[Annotated[str, Meta(pattern=r"\A[0-9]+\Z")], Number] = field(default_factory=dict)
     """Loss on the episodes that were held out, by update."""
 

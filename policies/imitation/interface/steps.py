@@ -2,7 +2,8 @@
 
 ```
 recorded columns ─ view ─▶ normalise ─▶ policy ─▶ unnormalise ─ act ─▶ joint velocities, or a mode's channels
-                     └──────────── the robot's pose now ─────────┘ or complete: joint velocities of an intent
+ ▲ encode            └──────────── the robot's pose now ─────────┘ or complete: joint velocities of an intent
+pictures
 ```
 """
 
@@ -31,6 +32,14 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.typed import Name, decoded
+from handrail.policies.imitation.encoder.encoder import Encoder
+from handrail.policies.imitation.encoder.step import (
+    PolicyEncoderStep,
+    encoder_step,
+    numbers_of,
+    shape_of,
+    size_of,
+)
 from handrail.policies.imitation.interface.checkpoint import Fps
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import ACT, COMPLETE, VIEW
@@ -141,10 +150,10 @@ class PolicyViewStep(PolicyStep):
         """Return what the policy reads."""
         raw = dict(transition.get(TransitionKey.OBSERVATION) or {})
         shown, sizes = dict(raw), (len(self.seen.state_names), len(self.seen.environment_names))
-        if ENVIRONMENT not in shown and _size(shown.get(STATE)) == sum(sizes):
+        if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
             shown[STATE], shown[ENVIRONMENT] = torch.split(shown[STATE], [*sizes], dim=-1)
-        state = _numbers(shown, STATE, sizes[0])
-        around = _numbers(shown, ENVIRONMENT, sizes[1]) if sizes[1] else np.zeros((len(state), 0))
+        state = numbers_of(shown, STATE, sizes[0], VIEW)
+        around = numbers_of(shown, ENVIRONMENT, sizes[1], VIEW) if sizes[1] else np.zeros((len(state), 0))
         device = shown[STATE].device
         for key, values in zip((STATE, ENVIRONMENT), self.seen.observe(state, around), strict=True):
             shown.pop(key, None)
@@ -178,7 +187,7 @@ class PolicyActionStep(PolicyStep):
         if self.view is None or self.view.state is None:
             raise self._error(f"expected the step {VIEW} to see something first, in the preprocessor")
         action, size = transition.get(TransitionKey.ACTION), len(self.seen.action_names)
-        if not isinstance(action, torch.Tensor) or _size(action) != size:
+        if not isinstance(action, torch.Tensor) or size_of(action) != size:
             raise self._error(f"expected {size} numbers, got {getattr(action, 'shape', action)}")
         rows = action.detach().cpu().numpy().reshape(-1, size)
         states = np.broadcast_to(self.view.state, (len(rows), self.view.state.shape[1]))
@@ -231,7 +240,7 @@ class PolicyCompletionStep(PolicyActionStep):
         for key in AROUND:
             if not isinstance(values := raw.get(key), torch.Tensor) or len(values) != len(rows):
                 words = f"expected {key} of {len(rows)} robots, as --env.type=handrail shows it"
-                raise self._error(f"{words}; got {_shape(values)}")
+                raise self._error(f"{words}; got {shape_of(values)}")
         around = [raw[key].detach().cpu().numpy().astype(np.float64) for key in AROUND]
         self._robots += [CompletedRobot(self.seen, self._by) for _ in rows[len(self._robots) :]]
         parts = zip(self._robots, rows, states, *around, strict=False)
@@ -239,7 +248,11 @@ class PolicyCompletionStep(PolicyActionStep):
 
 
 def with_steps(
-    before: Any, after: Any, interface: PolicyInterface | None, by: Completion | None = None
+    before: Any,
+    after: Any,
+    interface: PolicyInterface | None,
+    by: Completion | None = None,
+    encoder: Encoder | None = None,
 ) -> tuple[Any, Any]:
     """Return a policy's processors with the steps of its interface, so that anybody can run the policy.
 
@@ -248,13 +261,15 @@ def with_steps(
         after: LeRobot's postprocessor.
         interface: what the policy reads and writes; None if that is what was recorded.
         by: what completes its intents, if all its names are found again without importing what a file says.
+        encoder: reads for it from pictures where things are.
     """
     if interface is None:
         return before, after
     described = json.loads(json.dumps(asdict(interface)))
     view, steps = PolicyViewStep(described), list(before.steps)
     normalisers = [i for i, step in enumerate(steps) if isinstance(step, NormalizerProcessorStep)]
-    steps.insert(normalisers[0] if normalisers else len(steps), view)
+    first = normalisers[0] if normalisers else len(steps)
+    steps[first:first] = [*([encoder_step(encoder)] if encoder else []), view]
     act = PolicyActionStep(described)
     if interface.is_partial and by and by.robot in ROBOTS and by.task in TASKS and by.mode in MODES:
         act = PolicyCompletionStep(described, asdict(by))
@@ -262,23 +277,6 @@ def with_steps(
 
 
 def without_steps(pipeline: Any) -> Any:
-    """Return a processor without the steps of an interface, for who sees and acts through that itself."""
-    return replace(pipeline, steps=[step for step in pipeline.steps if not isinstance(step, PolicyStep)])
-
-
-def _numbers(observation: Mapping[str, Any], key: str, size: int) -> FloatArray:
-    """Return the numbers under a key, (B, size)."""
-    values = observation.get(key)
-    if not isinstance(values, torch.Tensor) or _size(values) != size:
-        raise HandrailError(
-            f"step {VIEW}: expected {key} with {size} numbers, as recorded; got {_shape(values)}"
-        )
-    return values.detach().cpu().numpy().reshape(-1, size)
-
-
-def _size(values: Any) -> int:
-    return values.shape[-1] if isinstance(values, torch.Tensor) and values.ndim else 0
-
-
-def _shape(values: Any) -> object:
-    return "none" if values is None else list(getattr(values, "shape", ()))
+    """Return a processor without our own steps, for who sees and acts through an interface itself."""
+    ours = PolicyStep, PolicyEncoderStep
+    return replace(pipeline, steps=[step for step in pipeline.steps if not isinstance(step, ours)])

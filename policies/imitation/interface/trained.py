@@ -16,6 +16,8 @@ from safetensors.torch import load_model
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.policies.imitation.encoder.encoder import Encoder
+from handrail.policies.imitation.encoder.step import encoder_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
 from handrail.policies.imitation.interface.steps import without_steps
@@ -34,6 +36,8 @@ class TrainedPolicy:
     """LeRobot's preprocessor: normalises."""
     after: Callable[[Any], Any]
     """LeRobot's postprocessor: the reverse."""
+    encoder: Encoder | None = None
+    """Reads for it from pictures where things are."""
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -90,7 +94,7 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     before, after = map(without_steps, around)  # an operator sees and acts through the interface itself
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
-    return TrainedPolicy(meta, policy, before, after)
+    return TrainedPolicy(meta, policy, before, after, encoder_of(around[0]))
 
 
 @contextmanager

@@ -24,6 +24,7 @@ from handrail.datasets.storage.strict_json import load_json
 CONFIG, WEIGHTS = "config.json", "model.safetensors"
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
 VIEW, ACT, COMPLETE = "handrail_policy_view", "handrail_policy_action", "handrail_policy_mpc"
+ENCODE = "handrail_policy_encoder"
 """Our own steps (`steps.py`): their settings are names, which they check themselves."""
 # notes, by which nothing is loaded
 _NOTES = ("pretrained_path", "pretrained_revision", "repo_id", "license", "tags")
@@ -63,7 +64,7 @@ def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, An
     _check_places(path, settings, known)
     for path in (folder / name for name in PROCESSORS):
         for step in _steps(path, kinds[kind]):
-            if step["registry_name"] not in (VIEW, ACT, COMPLETE):
+            if step["registry_name"] not in (ENCODE, VIEW, ACT, COMPLETE):
                 _check_places(path, step, known)
     if not (folder / WEIGHTS).is_file():
         raise HandrailError(f"policy {str(folder)!r}: expected weights in {WEIGHTS}, found none")

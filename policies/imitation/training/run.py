@@ -33,6 +33,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import publish_folder
+from handrail.policies.imitation.encoder.encoder import Encoder
 from handrail.policies.imitation.interface.checkpoint import MODEL, PolicyMeta, point_to, write_meta
 from handrail.policies.imitation.interface.steps import Completion, with_steps, without_steps
 from handrail.policies.imitation.interface.trained import check_numbers, load_weights
@@ -57,6 +58,7 @@ class TrainingRun:
         checkpoint: to go on from; None to begin.
         plateau: ends the training where the loss on held-out episodes is flat, and says how the learning rate
             goes; None makes all updates, by the settings' schedule.
+        encoder: that reads pictures for the policy when it drives.
     """
 
     def __init__(
@@ -65,11 +67,13 @@ class TrainingRun:
         learnt: MemoryDataset,
         checkpoint: Path | None,
         plateau: Plateau | None,
+        encoder: Encoder | None = None,
     ) -> None:
         described = settings.policy
         assert described is not None
         assert settings.output_dir is not None
         self._settings, self._learnt, self._plateau = settings, learnt, plateau
+        self._encoder = encoder
         self._folder, self._sums = settings.output_dir, read_sums(checkpoint)
         self._accelerator = _accelerator(described)
         set_seed(settings.seed, self._accelerator)  # pyright: ignore[reportArgumentType]
@@ -214,7 +218,7 @@ class TrainingRun:
         draft = folder.with_name(f".{folder.name}")
         shutil.rmtree(draft, ignore_errors=True)
         completion = Completion(meta.robot, meta.environment, meta.mode, meta.fps)
-        around = with_steps(self._before, self._after, meta.interface, completion)
+        around = with_steps(self._before, self._after, meta.interface, completion, self._encoder)
         policy, sizes = self._accelerator.unwrap_model(self._policy), self._settings.batch_size
         parts = (policy, self._optimizer, self._schedule, *around)
         save_checkpoint(draft, meta.steps, self._settings, *parts, self._accelerator.num_processes, sizes)

@@ -18,6 +18,8 @@ from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.encoder.cache import encoded
+from handrail.policies.imitation.encoder.encoder import Encoder, find_encoder
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta
 from handrail.policies.imitation.interface.interface import (
     ACTION,
@@ -62,6 +64,8 @@ class TrainingSource:
     """What the policy reads and writes; None where that is what was recorded."""
     features: Features
     """Every column that it learns from, and every camera."""
+    encoder: Encoder | None
+    """Says instead of the dataset where things are."""
     columns: Columns
     """All columns of all episodes, (N, …) each, and LeRobot's counters."""
 
@@ -134,10 +138,11 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Trainin
     info = read_info(root)
     rows = with_success(info, read_episodes(root))
     selection = select_again(rows, began) if began else select(rows, info.fps, config)
+    encoder = find_encoder(config.encoder) if config.encoder else None
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
     else:
-        interface, features, columns = _interpreted(info, selection, config, config.actions)
+        interface, features, columns = _interpreted(info, selection, config, config.actions, encoder)
     if config.images:
         if not (cameras := pictured(info)):
             raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
@@ -146,7 +151,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Trainin
         features.pop(ENVIRONMENT, None)
         columns.pop(ENVIRONMENT, None)
     columns |= _counters(selection.rows, info.fps)
-    source = TrainingSource(config, info, selection, interface, features, columns)
+    source = TrainingSource(config, info, selection, interface, features, encoder, columns)
     if began is not None and source.digest != began.data:
         count = began.trained_on.get("episodes", 0)
         raise HandrailError(f"--resume: expected the {count:g} episodes that it began with, got others")
@@ -167,7 +172,11 @@ def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _interpreted(
-    info: DatasetInfo, selection: Selection, config: TrainConfig, actions: Literal["realised", "intent"]
+    info: DatasetInfo,
+    selection: Selection,
+    config: TrainConfig,
+    actions: Literal["realised", "intent"],
+    encoder: Encoder | None,
 ) -> tuple[PolicyInterface, Features, Columns]:
     """Return what a policy learns through an interface."""
     if actions == "intent":
@@ -183,10 +192,31 @@ def _interpreted(
         state, environment = interface.observe(episode[STATE], episode[ENVIRONMENT])
         return {STATE: state, ENVIRONMENT: environment, ACTION: interface.encode(episode)}
 
-    columns = _joined(map(learnt, _episodes(info, selection, COLUMNS)))
+    episodes = _episodes(info, selection, COLUMNS)
+    if encoder:
+        _check_fits(encoder, interface)
+        episodes = _encoded(info, selection, encoder, episodes)
+    columns = _joined(map(learnt, episodes))
     names = zip(columns, (*interface.observation_names, interface.action_names), strict=True)
     features = {key: Feature("float32", (len(each),), each) for key, each in names if each}
     return interface, features, {key: columns[key] for key in features}
+
+
+def _check_fits(encoder: Encoder, interface: PolicyInterface) -> None:
+    """Check that an encoder reads and says what was recorded."""
+    reads = encoder.reads
+    for name in ("state_names", "environment_names", "channels"):
+        if getattr(reads.interface, name) != getattr(interface, name):
+            words = f"expected one for the dataset's robot and task, got one for {reads.robot}, {reads.task}"
+            raise HandrailError(f"--encoder: {words}: other {name.replace('_', ' ')}")
+
+
+def _encoded(
+    info: DatasetInfo, selection: Selection, encoder: Encoder, episodes: Iterable[Columns]
+) -> Iterator[Columns]:
+    """Yield episodes with what the encoder says instead of where things are."""
+    for row, episode in zip(selection.rows, episodes, strict=True):
+        yield episode | {ENVIRONMENT: encoded(info, row, episode[STATE], encoder)}
 
 
 def _check_one_mode(selection: Selection, said: str) -> None:

@@ -63,7 +63,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
             settings = _settings(config, steps, warmup)
             assert settings.policy is not None
             learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
-            training = TrainingRun(settings, learnt, checkpoint, plateau)
+            training = TrainingRun(settings, learnt, checkpoint, plateau, source.encoder)
             measured = out[0] if out else None, losses, config.eval_steps
             training.train(lambda step: _meta(source, step, losses), *measured, quiet)
         checkpoint = last_checkpoint(config.folder)
@@ -142,6 +142,7 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> Po
         episodes=tuple(int(row["episode_index"]) for row in rows),
         data=source.digest,
         time_limit=_time_limit(rows),
+        cameras=source.encoder.reads.cameras if source.encoder else {},
         validation={str(step): loss for step, loss in losses.items()},
     )
 

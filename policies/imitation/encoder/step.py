@@ -1,0 +1,122 @@
+"""An encoder as a step of LeRobot's processors, inside a checkpoint: who loads it needs no more."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from lerobot.configs import PipelineFeatureType, PolicyFeature
+from lerobot.lerobot_types import EnvTransition, TransitionKey
+from lerobot.processor import ProcessorStep, ProcessorStepRegistry
+from lerobot.utils.constants import OBS_IMAGES
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import decoded
+from handrail.policies.imitation.encoder.encoder import Encoder, Reads
+from handrail.policies.imitation.encoder.memory import Memory
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.trust import ENCODE
+
+_TIME = "observation.time"
+Features = dict[PipelineFeatureType, dict[str, PolicyFeature]]
+
+
+@ProcessorStepRegistry.register(ENCODE)
+@dataclass(eq=False)
+class PolicyEncoderStep(ProcessorStep):
+    """Reads from pictures where things are, as `observation.environment_state`, whatever is told of it."""
+
+    reads: dict[str, Any]
+    """What the encoder reads and says, as JSON."""
+
+    def __post_init__(self) -> None:
+        """Make the encoder; its weights come later."""
+        self.encoder = Encoder(decoded(self.reads, Reads, f"step {ENCODE}"))
+        self.reset()
+
+    def __call__(self, transition: EnvTransition) -> EnvTransition:
+        """Return the observation with what the pictures say."""
+        shown, reads = dict(transition.get(TransitionKey.OBSERVATION) or {}), self.encoder.reads
+        sizes = len(reads.interface.state_names), len(reads.interface.environment_names)
+        if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
+            shown[STATE] = shown[STATE][..., : sizes[0]]
+        states, device = numbers_of(shown, STATE, sizes[0], ENCODE), shown[STATE].device
+        pictures = {
+            name: shown[key].detach().cpu().reshape(-1, *shown[key].shape[-3:])
+            for name in reads.cameras
+            if isinstance(shown.get(key := f"{OBS_IMAGES}.{name}"), torch.Tensor)
+        }
+        said = self.encoder.look(pictures, states)
+        self._memories += [Memory(reads) for _ in states[len(self._memories) :]]
+        self._forget(shown.get(_TIME))
+        moments = zip(self._memories, range(len(states)), strict=False)
+        rows = np.stack([memory.take(said, moment) for memory, moment in moments])
+        around = torch.as_tensor(rows, device=device)
+        shown[ENVIRONMENT] = around.reshape(*shown[STATE].shape[:-1], sizes[1])
+        changed: Any = transition.copy()
+        changed[TransitionKey.OBSERVATION] = shown
+        return changed
+
+    def _forget(self, times: object) -> None:
+        """Forget where an episode begins: where the time is not later."""
+        if isinstance(times, torch.Tensor):
+            before, self._times = self._times, times.detach().cpu().numpy().ravel()
+            for memory, now, then in zip(self._memories, self._times, before, strict=False):
+                if now <= then:
+                    memory.forget()
+
+    def get_config(self) -> dict[str, Any]:
+        """Return what makes this step again."""
+        return {"reads": self.reads}
+
+    def state_dict(self) -> dict[str, torch.Tensor]:
+        """Return the encoder's weights."""
+        return dict(self.encoder.network.state_dict())
+
+    def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
+        """Take the encoder's weights."""
+        self.encoder = Encoder.of(self.reads, state, f"step {ENCODE}")
+
+    def transform_features(self, features: Features) -> Features:
+        """Return the features as they are."""
+        return features
+
+    def reset(self) -> None:
+        """Forget what was seen."""
+        self._memories: list[Memory] = []
+        self._times = np.zeros(0)
+
+
+def encoder_step(encoder: Encoder) -> PolicyEncoderStep:
+    """Return the step of an encoder."""
+    step = PolicyEncoderStep(json.loads(json.dumps(asdict(encoder.reads))))
+    step.encoder = encoder
+    return step
+
+
+def encoder_of(pipeline: Any) -> Encoder | None:
+    """Return the encoder of a processor, if it has one."""
+    return next((step.encoder for step in pipeline.steps if isinstance(step, PolicyEncoderStep)), None)
+
+
+def numbers_of(observation: Mapping[str, Any], key: str, size: int, step: str) -> FloatArray:
+    """Return the numbers under a key, (B, size)."""
+    values = observation.get(key)
+    if not isinstance(values, torch.Tensor) or size_of(values) != size:
+        raise HandrailError(
+            f"step {step}: expected {key} with {size} numbers, as recorded; got {shape_of(values)}"
+        )
+    return values.detach().cpu().numpy().reshape(-1, size)
+
+
+def size_of(values: Any) -> int:
+    """Return the size of a tensor's last dimension; 0 of none."""
+    return values.shape[-1] if isinstance(values, torch.Tensor) and values.ndim else 0
+
+
+def shape_of(values: Any) -> object:
+    """Return the shape of a tensor, for a message."""
+    return "none" if values is None else list(getattr(values, "shape", ()))
