@@ -1,4 +1,4 @@
-"""What disturbs an episode: late observations, pushes, a start elsewhere."""
+"""What disturbs an episode: late observations, other pictures, pushes, a start elsewhere."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -48,6 +48,38 @@ class DelayedOperator:
         self._views.append(view)
         asked = self._operator.act(self._views.popleft())
         return asked if isinstance(asked, EpisodeEvent) else replace(asked, time=view.state.time)
+
+
+class OtherPictures:
+    """Shows another operator other pictures than those of the episode; an operator.
+
+    Args:
+        operator: whoever steers.
+        other: the same robot elsewhere: it is shown in the scene of another episode, where it is in its own.
+            Without, pictures are black.
+    """
+
+    def __init__(self, operator: Operator, other: HandrailEnv | None) -> None:
+        self._operator, self._other = operator, other
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        if self._other:
+            self._other.reset(seed=int(rng.integers(2**32)))
+        self._operator.reset(self._changed(view), rng)
+
+    def act(self, view: View) -> Intent | EpisodeEvent:
+        """Return what is asked for now."""
+        return self._operator.act(self._changed(view))
+
+    def _changed(self, view: View) -> View:
+        pictures = view.observation["pixels"]
+        if self._other:
+            self._other.simulation.show(view.state.q)
+            pictures = self._other.pictures(tuple(pictures))
+        else:
+            pictures = {name: np.zeros_like(each) for name, each in pictures.items()}
+        return replace(view, observation={**view.observation, "pixels": pictures})
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What may disturb an episode: pushes, a start elsewhere, late observations, moved cameras. Light to import.
+"""What may disturb an episode: pushes, a start elsewhere, late observations, other pictures. Light to import.
 
 All of it is drawn from the episode's seed and from nothing that the robot does, so that whoever runs the same
 seed meets the same disturbance.
@@ -14,8 +14,16 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.typed import check_settings
 
 NONE = "none"
-DEFAULTS: Mapping[str, float] = {"push": 1.0, "shift": 0.3, "delay": 3, "camera": 1.0}
-_WORDS = {"push": "pushed", "shift": "shifted", "delay": "delayed", "camera": "camera moved"}
+DEFAULTS: Mapping[str, float] = {"push": 1.0, "shift": 0.3, "delay": 3, "camera": 1.0, "blank": 1, "swap": 1}
+_WORDS = {
+    "push": "pushed",
+    "shift": "shifted",
+    "delay": "delayed",
+    "camera": "camera moved",
+    "blank": "cameras blank",
+    "swap": "pictures of another episode",
+}
+PICTURES = ("camera", "blank", "swap")  # those that change what cameras see, and nothing else
 
 
 @dataclass(frozen=True)
@@ -28,6 +36,8 @@ class Perturbation:
     """How far from the demonstrations' start the robot begins at most [m, rad]."""
     delay: Annotated[int, Meta(ge=0, le=100)] = 0  # control periods by which observations come late
     camera: Annotated[float, Meta(ge=0, le=10)] = 0.0  # each is moved by 2 cm and turned by 3°, times this
+    blank: Annotated[int, Meta(ge=0, le=1)] = 0  # whether pictures are black
+    swap: Annotated[int, Meta(ge=0, le=1)] = 0  # whether pictures are of another episode's scene
 
     def __post_init__(self) -> None:
         """Check the sizes."""
@@ -49,7 +59,7 @@ class Perturbation:
                 raise HandrailError(f"--perturbation {name}:{number}: expected a number above 0")
             if name in sizes:
                 raise HandrailError(f"--perturbation {text}: expected each of {', '.join(DEFAULTS)} once")
-            sizes[name] = int(size) if name == "delay" and size.is_integer() else size
+            sizes[name] = int(size) if isinstance(DEFAULTS[name], int) and size.is_integer() else size
         return cls(**sizes)  # type: ignore[arg-type]
 
     @property

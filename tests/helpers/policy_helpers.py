@@ -21,6 +21,8 @@ HOLD = 15  # periods for which a random policy keeps to what it drew
 class StandIn:
     """Sees and acts as a trained policy does; `kind` says how."""
 
+    encoder = None
+
     def __init__(self, interface: PolicyInterface, kind: str) -> None:
         self.interface = interface
         self._kind = kind

@@ -13,7 +13,7 @@ from handrail.collect.config import MOST_MOVING, SessionConfig
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_mode, build_task
-from handrail.collect.session.perturbations import Perturbation
+from handrail.collect.session.perturbations import PICTURES, Perturbation
 from handrail.collect.world.observation import AgentObservation
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.baselines.catalogue import CONTROLLERS
@@ -254,7 +254,7 @@ def _condition(
     perturbation: Perturbation, protection: str, checkpoint: Checkpoint, config: EvaluateConfig
 ) -> PolicyCondition:
     meta, mode = checkpoint.meta, checkpoint.meta.intent_mode
-    if perturbation.camera and not checkpoint.pictures:
+    if not (checkpoint.pictures or perturbation.sizes.keys().isdisjoint(PICTURES)):
         words = f"expected a policy that sees pictures; {checkpoint.folder} reads none"
         raise HandrailError(f"--perturbation {perturbation.text}: {words}")
     own = own_protection(mode)

@@ -11,9 +11,9 @@ import numpy as np
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.operators.operator import View
+from handrail.collect.operators.operator import Operator, View
 from handrail.collect.session.build import build_controller, build_env
-from handrail.collect.session.disturbances import DelayedOperator, Pusher
+from handrail.collect.session.disturbances import DelayedOperator, OtherPictures, Pusher
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.session.session import Observer, Session
@@ -173,14 +173,21 @@ def run_rollout(
     """
     checkpoint, perturbation = condition.checkpoint, condition.perturbation
     meta = checkpoint.meta
-    env = _env(_session_config(condition), meta.fps, perturbation, render)
+    config = _session_config(condition)
+    env = _env(config, meta.fps, perturbation, render)
     controller = _controller(condition.protection, meta.intent_mode, meta.environment, env)
     policy = _policy(checkpoint.folder, checkpoint.digest, load)
     channels = Channels.of(env.model.description)
     interface = meta.interface or RecordedColumns(checkpoint)
     with threads(1), repeatable(seed):
         operator = PolicyOperator(policy, interface, channels, meta.mode, env.task.description)
-        late = DelayedOperator(operator, perturbation.delay)
+        shown: Operator = operator
+        if perturbation.blank or perturbation.swap:
+            other = replace(perturbation, swap=0)
+            shown = OtherPictures(
+                operator, _env(config, meta.fps, other, False) if perturbation.swap else None
+            )
+        late = DelayedOperator(shown, perturbation.delay)
         pushers = (Pusher(perturbation.push),) if perturbation.push else ()
         progress = RolloutProgress()
         session = Session(env, controller, late, (*observers, progress), disturbances=pushers)

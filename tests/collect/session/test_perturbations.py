@@ -23,9 +23,9 @@ MODEL = load_model()
 
 
 def test_what_is_written_is_what_is_read():
-    for text in ("none", "push:1", "push:2.5+shift:0.3+delay:4", "camera:2"):
+    for text in ("none", "push:1", "push:2.5+shift:0.3+delay:4", "camera:2", "blank:1+swap:1"):
         assert Perturbation.parse(text).text == text
-    assert Perturbation.parse("push+shift+delay+camera").sizes == DEFAULTS
+    assert Perturbation.parse("push+shift+delay+camera+blank+swap").sizes == DEFAULTS
     assert Perturbation.parse(" push + delay:5 ").words == "pushed delayed:5"
     assert Perturbation.parse("camera").words == "camera moved"
     assert Perturbation.parse("none") == Perturbation()

@@ -191,7 +191,7 @@ WRONG = {
     "perturbation": ({"perturbation": "rain"}, ("chase",), "unknown perturbation 'rain'"),
     "size": ({"perturbation": "push:-1"}, ("chase",), "--perturbation push:-1: expected a number above 0"),
     "half a period": ({"perturbation": "delay:1.5"}, ("chase",), "delay: expected a whole number"),
-    "twice": ({"perturbation": "push+push"}, ("chase",), "expected each of push, shift, delay, camera once"),
+    "twice": ({"perturbation": "push+push"}, ("chase",), "delay, camera, blank, swap once"),
     "blind": ({"perturbation": "camera"}, ("chase",), "expected a policy that sees pictures"),
     "filter": ({"protection": "filter"}, ("chase",), "or a policy of joint velocities"),
     "rests": ({"protection": "mpc"}, ("single",), "or a policy of joint velocities"),

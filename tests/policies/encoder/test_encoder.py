@@ -1,0 +1,173 @@
+"""An encoder's laws: what it says comes from pictures, its file is all that it is, its memory fits."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.session.build import build_env, session_features
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.encoder.encoder import Encoder, Reads, Said, find_encoder, same
+from handrail.policies.imitation.encoder.memory import Memory
+from handrail.policies.imitation.encoder.network import Network
+from handrail.policies.imitation.encoder.step import encoder_step
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
+
+SIZE = (32, 48)
+
+
+def reads(task="pick_place"):
+    env = build_env(SessionConfig(task=task), 20)
+    interface = PolicyInterface.of_dataset(session_features(env), (), "realised")
+    return Reads("ridgeback_ur10", task, {"front": SIZE, "wrist": SIZE}, interface, {"cube": 4})
+
+
+def encoder(seed=0):
+    torch.manual_seed(seed)
+    return Encoder(reads())
+
+
+def moments(count=3, seed=0):
+    """Return pictures and states of some moments."""
+    env, rng = build_env(SessionConfig(task="pick_place"), 20), np.random.default_rng(seed)
+    states = np.stack([env.reset(seed=each)[0]["agent_pos"] for each in range(count)])
+    pictures = {name: rng.integers(0, 256, (count, *SIZE, 3), np.uint8) for name in ("front", "wrist")}
+    return pictures, states
+
+
+def test_it_tells_of_what_has_a_pose_or_a_position_and_of_nothing_else():
+    said, (pictures, states) = encoder(), moments()
+    assert [name for name, _, _ in said.reads.objects] == ["cube", "bin", "cube_table", "bin_table"]
+    numbers = Memory(said.reads).take(said.look(pictures, states), 0)
+    names = said.reads.interface.environment_names
+    zero = {name.split(".")[0] for name, value in zip(names, numbers, strict=True) if value == 0.0}
+    assert zero == {"obstacle_0", "obstacle_1", "obstacle_2"}
+
+
+def test_its_file_is_all_that_it_is(tmp_path):
+    one, (pictures, states) = encoder(), moments()
+    one.save(tmp_path / "a.safetensors")
+    loaded = find_encoder(str(tmp_path / "a.safetensors"))
+    loaded.save(tmp_path / "b.safetensors")
+    assert loaded.reads == one.reads
+    assert loaded.digest == one.digest != encoder(1).digest
+    assert (tmp_path / "a.safetensors").read_bytes() == (tmp_path / "b.safetensors").read_bytes()
+    first, second = one.look(pictures, states), loaded.look(pictures, states)
+    np.testing.assert_allclose(first["cube"].position, second["cube"].position, atol=5e-3)  # float16
+
+
+def test_what_it_says_moves_with_the_robot():
+    """The same picture elsewhere is the same thing, as far from the hand."""
+    one, (pictures, states) = encoder(), moments(1)
+    names = one.reads.interface.state_names
+    elsewhere = states.copy()
+    for name, by in (("x.pos", 1.0), ("tool.x", 1.0)):
+        elsewhere[:, names.index(name)] += by
+    one.network.spread[:] = 1e9  # the state itself says nothing
+    here, there = one.look(pictures, states)["cube"], one.look(pictures, elsewhere)["cube"]
+    np.testing.assert_allclose(there.position - here.position, [[1.0, 0.0, 0.0]], atol=1e-5)
+    np.testing.assert_allclose(there.rotation, here.rotation, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda pictures: pictures.pop("wrist"), "camera wrist, 48 x 32 pixels, got none"),
+        (lambda pictures: pictures.update(front=pictures["front"][:, :16]), "camera front, 48 x 32 pixels"),
+    ],
+)
+def test_other_pictures_are_refused(change, words):
+    pictures, states = moments()
+    change(pictures)
+    with pytest.raises(HandrailError, match=words):
+        encoder().look(pictures, states)
+
+
+def test_a_file_of_something_else_is_refused(tmp_path):
+    one, path = encoder(), tmp_path / "e.safetensors"
+    with pytest.raises(HandrailError, match="unknown encoder"):
+        find_encoder("nowhere")
+    path.write_bytes(b"nothing")
+    with pytest.raises(HandrailError, match=r"e\.safetensors"):
+        find_encoder(str(path))
+    save_file(one.network.state_dict(), path)
+    with pytest.raises(HandrailError, match="expected"):
+        find_encoder(str(path))
+    one.network.mean[0] = float("nan")
+    one.save(path)
+    with pytest.raises(HandrailError, match="expected finite weights"):
+        find_encoder(str(path))
+
+
+def said(place, off=0.1, turn=None, turned_off=0.1):
+    rotation = None if turn is None else np.asarray(turn)[None]
+    return Said(np.array([place], float), np.array([off]), rotation, np.array([turned_off]))
+
+
+def remembered(memory, of_cube):
+    others = {name: said([0.0, 0.0, 0.0]) for name in ("bin", "cube_table", "bin_table")}
+    return memory.take({"cube": of_cube} | others, 0)[:7]
+
+
+def test_what_is_said_again_and_again_becomes_surer():
+    memory, rng = Memory(reads()), np.random.default_rng(0)
+    for _ in range(50):
+        now = remembered(memory, said([1.0, 2.0, 0.5] + rng.normal(0, 0.05, 3), 0.1, np.eye(3)))
+    assert np.linalg.norm(now[:3] - [1.0, 2.0, 0.5]) < 0.04
+    np.testing.assert_allclose(now[3:], [1.0, 0.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_what_is_surer_counts_more():
+    memory = Memory(reads())
+    remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
+    assert remembered(memory, said([1.02, 0.0, 0.0], 0.1, np.eye(3)))[0] < 1.001
+
+
+def test_what_moved_is_known_anew_at_once():
+    memory = Memory(reads())
+    for _ in range(20):
+        remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
+    np.testing.assert_allclose(remembered(memory, said([2.0, 0.0, 0.0], 0.01, np.eye(3)))[0], 2.0)
+
+
+def test_a_quarter_turn_of_a_cube_is_no_turn():
+    memory, quarter = Memory(reads()), same(4)[1]
+    first = remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
+    np.testing.assert_allclose(remembered(memory, said([1.0, 0.0, 0.0], 0.01, quarter)), first, atol=1e-6)
+
+
+def test_in_a_checkpoint_it_says_the_same(tmp_path):
+    """As a step of LeRobot's it reads robots side by side, and forgets when an episode begins."""
+    one, (pictures, states) = encoder(), moments(2)
+    step = encoder_step(one)
+    step.load_state_dict(step.state_dict())
+    images = {
+        f"observation.images.{name}": torch.from_numpy(each).movedim(-1, 1) / 255.0
+        for name, each in pictures.items()
+    }
+    shown = images | {STATE: torch.from_numpy(states), ENVIRONMENT: torch.zeros(2, 28)}
+    memories = [Memory(one.reads), Memory(one.reads)]
+    for times in ([0.0, 0.0], [0.05, 0.05], [0.10, 0.0]):
+        if times[1] == 0.0:
+            memories[1].forget()
+        told = one.look(pictures, states)
+        expected = np.stack([memory.take(told, row) for row, memory in enumerate(memories)])
+        found = step({"observation": shown | {"observation.time": torch.tensor(times)[:, None]}})
+        np.testing.assert_array_equal(found["observation"][ENVIRONMENT].numpy(), expected)
+    joined = {**images, STATE: torch.cat([torch.from_numpy(states), torch.ones(2, 28)], 1)}
+    step.reset()
+    found = step({"observation": joined})["observation"]
+    assert found[STATE].shape == (2, states.shape[1])
+    np.testing.assert_array_equal(found[ENVIRONMENT][0], Memory(one.reads).take(told, 0))
+
+
+def test_eyes_of_large_pictures_halve_them_more():
+    """What an eye's spatial softmax says is where the one bright place is."""
+    for size in ((96, 96), (224, 224), (360, 640)):
+        network = Network({"front": size[0]}, 3, 4).eval()
+        found = network({"front": torch.zeros(1, 3, *size)}, torch.zeros(1, 3))
+        assert found.shape == (1, 4)
+    assert dataclasses.is_dataclass(Reads)
