@@ -10,6 +10,11 @@ from handrail.collect.world.gl import MjData, MjModel, missing_graphics, mujoco
 from handrail.controllers.errors import unknown_name
 
 _MOST_GEOMS = 300
+_LASTING = (
+    *("mesh_vert", "mesh_normal", "mesh_face", "mesh_vertadr", "mesh_faceadr"),
+    *("tex_data", "tex_adr", "mat_texid", "mat_texrepeat", "mat_texuniform"),
+)
+_BULGING = [getattr(mujoco.mjtGeom, f"mjGEOM_{kind}").value for kind in ("SPHERE", "CAPSULE", "ELLIPSOID")]
 
 
 class Painter:
@@ -24,6 +29,7 @@ class Painter:
 
     _context: Any = None  # of OpenGL
     _loaded: Any = None  # meshes and textures of one model in it
+    _drawn: tuple[bytes, ...] = ()  # what they were made of
 
     def __init__(self, size: tuple[int, int], pretty: bool = False) -> None:
         self._size, self._pretty = size, pretty
@@ -58,10 +64,23 @@ class Painter:
         return np.flipud(picture).copy()  # OpenGL begins at the bottom
 
     def _load(self, model: MjModel) -> None:
-        """Take the meshes and textures of a model instead of those of the last one."""
+        """Take the meshes and textures of a model; where they are those of the last one they stay."""
         visual = model.vis
         visual.global_.offheight, visual.global_.offwidth = self._size
         visual.quality.shadowsize, visual.quality.offsamples = (4096, 8) if self._pretty else (0, 0)
+        if not self._pretty and not _bulges(model):
+            visual.quality.numstacks = 2  # a cylinder's bands look the same
+        drawn = _drawn(model)
+        if self._loaded is None or drawn != self._drawn:
+            self._upload(model)
+            self._drawn = drawn
+        self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._scene.flags[flag] = self._pretty
+        self._model = model
+
+    def _upload(self, model: MjModel) -> None:
+        """Bring meshes and textures to where they are drawn from, in place of those of the last one."""
         self._unload()
         try:
             self._context = self._context or mujoco.GLContext(self._size[1], self._size[0])
@@ -70,10 +89,6 @@ class Painter:
         except Exception as error:  # each backend has its own kind
             raise missing_graphics(error) from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._loaded)
-        self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
-        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-            self._scene.flags[flag] = self._pretty
-        self._model = model
 
     def _unload(self) -> None:
         loaded, self._loaded, self._model = self._loaded, None, None
@@ -90,3 +105,15 @@ class Painter:
 
     def __del__(self) -> None:
         self.close()
+
+
+def _drawn(model: MjModel) -> tuple[bytes, ...]:
+    """Return all of a model from which OpenGL makes something that outlasts a picture."""
+    arrays = [getattr(model, name) for name in _LASTING]
+    planes = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE.value]
+    return (*(each.tobytes() for each in (*arrays, planes)), bytes([model.vis.quality.numstacks]))
+
+
+def _bulges(model: MjModel) -> bool:
+    """Whether something that is drawn is round in two directions."""
+    return bool(np.isin(model.geom_type[model.geom_group == VISIBLE_GROUP], _BULGING).any())

@@ -5,6 +5,8 @@ import pytest
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env
+from handrail.collect.world import rendering
+from handrail.collect.world.gl import mujoco
 from handrail.collect.world.rendering import Painter
 from handrail.controllers.errors import HandrailError
 
@@ -42,3 +44,32 @@ def test_one_painter_draws_what_a_new_one_draws(simulations, pretty):
         kept.paint(simulations[0].mujoco_model, simulations[0].data, "roof")
     kept.close()
     kept.close()
+
+
+@pytest.mark.needs_gl
+@pytest.mark.parametrize("robot", ["ridgeback_ur10", "ridgeback_panda", "lekiwi"])
+def test_bands_that_are_spared_cannot_be_seen(robot, monkeypatch):
+    env = build_env(SessionConfig(task="pick_place", robot=robot, cameras="all"), 20)
+    spared = env.reset(seed=3)[0]["pixels"]
+    assert env.simulation.mujoco_model.vis.quality.numstacks == 2
+    monkeypatch.setattr(rendering, "_bulges", lambda model: True)
+    whole = env.reset(seed=3)[0]["pixels"]
+    assert env.simulation.mujoco_model.vis.quality.numstacks > 2
+    env.close()
+    for camera, picture in spared.items():
+        assert np.abs(picture.astype(int) - whole[camera]).mean() < 0.3, camera
+
+
+@pytest.mark.needs_gl
+def test_what_bulges_stays_round():
+    text = """<mujoco><worldbody>
+        <camera name='eye' pos='0 -5 0' euler='90 0 0'/>
+        <geom type='sphere' size='1' group='1' rgba='1 1 1 1'/>
+    </worldbody></mujoco>"""
+    model, painter = mujoco.MjModel.from_xml_string(text), Painter((64, 64))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ball = (painter.paint(model, data, "eye") > 10).any(axis=2)
+    painter.close()
+    width, height = ball.any(axis=0).sum(), ball.any(axis=1).sum()
+    assert 0.74 < ball.sum() / (width * height) < 0.83  # π/4; of a double cone it is a half
