@@ -21,6 +21,7 @@ _font = cache(ImageFont.load_default)
 SIZE = (540, 960)  # height, width [px]
 _BAR = 64  # height of the caption [px]; both even, as h264 wants
 _GAP = 6  # between pictures [px]
+_INSET = 180  # height of a small picture in a film [px]
 
 
 class VideoFile:
@@ -80,11 +81,19 @@ class Filmer(VideoFile):
         fps: pictures a second.
         title: first line of the caption.
         words: second line, at a moment.
+        insets: pictures that are shown small in a corner, at a moment.
     """
 
-    def __init__(self, path: Path, fps: int, title: str, words: Callable[[Frame], str]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        fps: int,
+        title: str,
+        words: Callable[[Frame], str],
+        insets: Callable[[Frame], Sequence[NDArray[np.uint8]]] = lambda frame: (),
+    ) -> None:
         super().__init__(path, (SIZE[0] + _BAR, SIZE[1]), fps)
-        self._title, self._words = title, words
+        self._title, self._words, self._insets = title, words, insets
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Take note of the environment."""
@@ -94,7 +103,19 @@ class Filmer(VideoFile):
         """Add the picture of this moment."""
         picture = self._env.render()
         if picture is not None:
+            picture = with_insets(picture, self._insets(frame))
             self.add(captioned(picture, _BAR, (self._title, 9, 20), (self._words(frame), 37, 16)))
+
+
+def with_insets(picture: NDArray[np.uint8], insets: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Return a picture with smaller ones side by side in its upper left corner."""
+    image, left = Image.fromarray(picture), _GAP
+    for inset in insets:
+        small = Image.fromarray(inset)
+        small = small.resize((round(small.width * _INSET / small.height), _INSET))
+        image.paste(small, (left, _GAP))
+        left += small.width + _GAP
+    return np.array(image)
 
 
 def captioned(picture: NDArray[np.uint8], bar: int, *lines: tuple[str, int, int]) -> NDArray[np.uint8]:

@@ -20,6 +20,7 @@ import torch
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
+from scipy.ndimage import gaussian_filter
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
@@ -31,6 +32,7 @@ from handrail.policies.imitation.encoder.network import Network
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.relative import POSE, POSITION, RobotPose
 
+_SMOOTH = 40.0  # of a saliency: a picture's height over the standard deviation
 _FINEST = 2e-3  # b and b_r are at least that [m, 1]
 _SAID = {POSITION: 4, POSE: 11}  # numbers that the network says: d, b; and M, b_r
 OWN = Path(__file__).parent / "weights"
@@ -134,7 +136,36 @@ class Encoder:
             pictures: by camera, of 0 to 255, (T, height, width, 3); or of 0 to 1, (T, 3, height, width).
             states: of the robot, as recorded, (T, s).
         """
-        interface, tensors = self.reads.interface, dict[str, Tensor]()
+        with torch.inference_mode():
+            numbers = self.network(self._tensors(pictures), self._seen(states))
+        return self.said(numbers.double().numpy(), self.reads.interface.pose(states))
+
+    def saliency(self, pictures: Mapping[str, NDArray[np.uint8]], state: FloatArray) -> dict[str, FloatArray]:
+        """Return how much each pixel matters to what is said, by camera, (height, width), 0 to 1.
+
+        That is `‖∂d/∂pixel‖`, smoothed; d of all objects.
+
+        Args:
+            pictures: of a moment, by camera, (height, width, 3).
+            state: of the robot, as recorded, (s,).
+        """
+        tensors = self._tensors({name: each[None] for name, each in pictures.items()})
+        given = [each.requires_grad_() for each in tensors.values()]
+        numbers = self.network(tensors, self._seen(state[None]))
+        starts = np.cumsum([0, *(_SAID[parts] for _, parts, _ in self.reads.objects)])[:-1]
+        heat = [torch.zeros(each.shape[2:]) for each in given]
+        for number in (numbers[0, start + axis] for start in starts for axis in range(3)):
+            for total, slope in zip(heat, torch.autograd.grad(number, given, retain_graph=True), strict=True):
+                total += slope[0].square().sum(0)
+        smooth = [gaussian_filter(each.sqrt().numpy(), len(each) / _SMOOTH) for each in heat]
+        return {name: each / max(each.max(), 1e-12) for name, each in zip(tensors, smooth, strict=True)}
+
+    def _seen(self, states: FloatArray) -> Tensor:
+        return torch.from_numpy(self.reads.interface.observe_robot(states))
+
+    def _tensors(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor]) -> dict[str, Tensor]:
+        """Return pictures as the network takes them, those of its cameras."""
+        tensors = dict[str, Tensor]()
         for name, size in self.reads.cameras.items():
             given = pictures.get(name)
             if isinstance(given, np.ndarray):
@@ -144,9 +175,7 @@ class Encoder:
                 words = f"expected pictures of camera {name}, {size[1]} x {size[0]} pixels"
                 raise HandrailError(f"encoder: {words}, got {got}")
             tensors[name] = given
-        with torch.inference_mode():
-            numbers = self.network(tensors, torch.from_numpy(interface.observe_robot(states)))
-        return self.said(numbers.double().numpy(), interface.pose(states))
+        return tensors
 
     def said(self, numbers: FloatArray, pose: RobotPose) -> dict[str, Said]:
         """Return what the network's numbers (T, …) say, by object."""

@@ -170,7 +170,7 @@ class _Training:
 
     @property
     def _settings(self) -> dict[str, Any]:
-        free = ("output", "workers", "threads", "overwrite")
+        free = ("output", "updates", "workers", "threads", "overwrite")
         return {name: value for name, value in asdict(self._config).items() if name not in free}
 
 

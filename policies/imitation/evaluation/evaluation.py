@@ -1,9 +1,12 @@
 """Evaluates trained policies: every checkpoint under every condition on the same declared seeds."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Any
+
+import numpy as np
 
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
@@ -12,6 +15,7 @@ from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
+from handrail.policies.imitation.encoder.encoder import Encoder
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.file import EvaluationFile
@@ -106,10 +110,23 @@ def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_p
     condition = next((each for each in conditions if each.checkpoint.digest in drove), None)
     if condition is None:
         return "no policy drove"
-    fps = condition.checkpoint.meta.fps
-    with Filmer(Path(config.video).expanduser(), fps, condition.label, _words) as filmer:
+    fps, encoder = condition.checkpoint.meta.fps, load(condition.checkpoint.folder).encoder
+    insets = partial(_looked, encoder)
+    with Filmer(Path(config.video).expanduser(), fps, condition.label, _words, insets) as filmer:
         run_rollout(condition, config.seeds[0], load, (filmer,), SIZE)
     return ""
+
+
+def _looked(encoder: Encoder | None, frame: Frame) -> list[np.ndarray]:
+    """Return what the cameras see; red is where a change would change most what an encoder says."""
+    if encoder is None:
+        return list(frame.images.values())
+    heat = encoder.saliency(frame.images, frame.state)
+    shown: list[np.ndarray] = []
+    for name, warm in heat.items():
+        grey = frame.images[name].mean(axis=2, keepdims=True) * (1.0 - warm[..., None])
+        shown.append((grey + warm[..., None] * [255.0, 40.0, 0.0]).astype(np.uint8))
+    return shown
 
 
 def _words(frame: Frame) -> str:
