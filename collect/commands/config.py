@@ -3,11 +3,12 @@
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
 from handrail.collect.config import SessionConfig, StoredConfig
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_file, only_one
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.advanced import Advanced
@@ -46,7 +47,7 @@ class ReplayConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RenderConfig(EditConfig):
+class RenderConfig(EditConfig, ExecutionConfig):
     """Write a dataset with pictures of its episodes, drawn while their commands run again.
 
     One that was begun is gone on with.
@@ -61,11 +62,18 @@ class RenderConfig(EditConfig):
     randomise: bool = False
     """Draw light, colours, textures, cameras anew in each episode, even if none of it was when recorded."""
 
+    @property
+    def seen(self) -> dict[str, Any]:
+        """Settings of a session that say what is drawn."""
+        said = {"cameras": self.cameras, "image_size": self.image_size}
+        return said | ({"randomise": True} if self.randomise else {})
+
     def check(self) -> None:
         """Check what can be checked without reading anything."""
         if self.in_place:
             raise HandrailError("--in_place: expected --output with render")
         super().check()
+        self.check_execution()
 
 
 @dataclass(frozen=True)

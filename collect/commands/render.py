@@ -1,12 +1,14 @@
 """Pictures for a dataset that was recorded without: its commands run again, and cameras look on.
 
 A replay is exact, so that they are the pictures that recording would have taken. Every number stays as it is.
+Parts of a few episodes lie beside the dataset, in `.NAME.pictures`, until all are there and become one; which
+episodes a part has does not depend on who draws it.
 """
 
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,66 +16,116 @@ import numpy as np
 from handrail.collect.commands.config import RenderConfig
 from handrail.collect.commands.replay import replay_one_of
 from handrail.collect.config import SessionConfig
+from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.job import Job
 from handrail.collect.session.recorded import COLUMN as SETTINGS
 from handrail.collect.session.recorded import recorded_settings
 from handrail.collect.world.env import Observation
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.format.episode_rows import read_column_types, row_files
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.manifest import read_manifest
+from handrail.datasets.format.manifest import Manifest, read_manifest
 from handrail.datasets.format.metadata import is_extra
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.check import check_whole
-from handrail.datasets.reading.reader import OpenDataset, open_dataset, read_episodes
-from handrail.datasets.recording.folder import is_dataset
+from handrail.datasets.reading.reader import OpenDataset, open_dataset, read_episodes, read_info
+from handrail.datasets.recording.folder import check_target, is_dataset
 from handrail.datasets.recording.frames import PICTURE
+from handrail.datasets.recording.slice import TRIMMED
 from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.atomic import beside, explained, remove
+
+_RENDERING = ("handrail.collect.commands.render",)  # what those that draw have to load
+_FEW = 5  # episodes of a part at least
+_MANY = 1000  # parts at most
 
 
 def render(config: RenderConfig) -> None:
     """Write a dataset with pictures; one that was begun is gone on with."""
     check_whole(config.root, config.verify)
     with open_dataset(config.root) as dataset:
-        seen = {"cameras": config.cameras, "image_size": config.image_size}
-        seen |= {"randomise": True} if config.randomise else {}
-        for row in dataset.rows:
-            replace(recorded_settings(row), **seen).check()
-        with _writer(config, dataset) as writer:
-            for episode in range(writer.num_episodes, len(dataset.rows)):
-                _render(dataset, episode, writer, seen)
-            said = f"{config.target}: {writer.num_episodes} episodes, {writer.num_frames} frames"
-    Terminal().print(said)
+        for settings in dict.fromkeys(replace(recorded_settings(row), **config.seen) for row in dataset.rows):
+            settings.check()
+        first, end = _begun(config, dataset), len(dataset.rows)
+    folder = beside(config.target, "pictures")
+    size = max(_FEW, -(-(end - first) // _MANY))
+    jobs = [_job(config, folder, begin, min(size, end - begin)) for begin in range(first, end, size)]
+    with Execution(config, "drawing", Terminal(stderr=True), _RENDERING) as execution:
+        for result in execution.run(jobs):
+            if result.error:
+                drawn = any(row_files(Layout(job.arguments[1])) for job in jobs)
+                if not drawn:
+                    remove(folder)
+                kept = f"; what was drawn is kept in {folder}, and the same command goes on"
+                raise HandrailError(result.error + kept * drawn)
+    if jobs:
+        parts = [job.arguments[1] for job in jobs]
+        merge_datasets([*[config.target] * bool(first), *parts], config.target, config.name)
+    with explained(f"cannot remove {str(folder)!r}"):
+        remove(folder)
+    info = read_info(config.target)
+    Terminal().print(f"{config.target}: {info.episodes} episodes, {info.frames} frames")
 
 
-@contextmanager
-def _writer(config: RenderConfig, dataset: OpenDataset) -> Iterator[EpisodeWriter]:
-    """Provide the writer of the dataset with pictures, new or begun."""
-    layout, target = Layout(dataset.info.root), Layout(config.target)
-    manifest = read_manifest(layout)
+def _begun(config: RenderConfig, dataset: OpenDataset) -> int:
+    """Return how many episodes have their pictures; an output that is of something else is refused."""
+    layout, manifest = Layout(config.target), _manifest(config, dataset)
+    if not is_dataset(layout):
+        check_target(layout, overwrite=False)
+        return 0
+    manifest.check_fits(read_manifest(layout), f"--output {config.output}: cannot add to it")
+    there = _which(read_episodes(config.target))
+    if there != _which(dataset.rows[: len(there)], config.randomise):
+        raise HandrailError(f"--output {config.output}: expected episodes of {config.root}, found others")
+    return len(there)
+
+
+def _which(rows: Sequence[Mapping[str, Any]], randomise: bool = False) -> list[tuple[Any, ...]]:
+    """Return what tells episodes from others, also from those of the same seeds or with other looks."""
+    names = ("seed", "started", "length")
+    return [(*map(row.get, names), randomise or recorded_settings(row).randomise) for row in rows]
+
+
+def _manifest(config: RenderConfig, dataset: OpenDataset) -> Manifest:
+    """Return the schema of the dataset with pictures."""
+    manifest = read_manifest(Layout(config.root))
     numbers = {key: each for key, each in manifest.features.items() if not each.is_video}
-    look = SessionConfig(robot=_one_robot(dataset), cameras=config.cameras, image_size=config.image_size)
+    look = SessionConfig(robot=_one_robot(dataset), **config.seen)
     cameras = {PICTURE + name: Feature("video", (*look.image_shape, 3)) for name in look.camera_names}
     observed = {key: each for key, each in numbers.items() if key.startswith("observation.")}
     name = config.name or manifest.repo_id
-    manifest = replace(manifest, repo_id=name, features=observed | cameras | numbers)
-    if is_dataset(target):
-        begun = [_kind(row, False) for row in read_episodes(target.root)]
-        if begun != [_kind(row, config.randomise) for row in dataset.rows][: len(begun)]:
-            raise HandrailError(f"--output {config.output}: expected episodes of {config.root}, found others")
-        writer = EpisodeWriter.resume(target.root, manifest)
-    else:
-        writer = EpisodeWriter.create(target.root, manifest, types=read_column_types(row_files(layout)[-1]))
-    with writer:
-        try:
-            yield writer
-        finally:
-            writer.erase_if_empty()
+    return replace(manifest, repo_id=name, features=observed | cameras | numbers)
 
 
-def _kind(row: Mapping[str, Any], randomise: bool) -> tuple[Any, bool]:
-    """Return what says whether an episode is another's: its seed, and whether its looks are drawn."""
-    return row.get("seed"), randomise or recorded_settings(row).randomise
+def _job(config: RenderConfig, folder: Path, first: int, episodes: int) -> Job:
+    part = folder / f"part-{first:07d}"
+    name = f"episodes {first} to {first + episodes - 1}"
+    return Job(name, draw, (config, part, first, episodes), size=episodes, log=part.with_suffix(".log"))
+
+
+def draw(config: RenderConfig, part: Path, first: int, episodes: int) -> None:
+    """Write some episodes with pictures as a dataset of their own; one that was begun is gone on with.
+
+    Args:
+        config: of all.
+        part: folder of that dataset.
+        first: number of its first episode in the whole.
+        episodes: how many it has.
+    """
+    with open_dataset(config.root) as dataset:
+        layout, manifest = Layout(part), _manifest(config, dataset)
+        there = _which(read_episodes(part)) if row_files(layout) else []
+        wanted = _which(dataset.rows[first : first + episodes], config.randomise)
+        if there and there == wanted[: len(there)] and read_manifest(layout).features == manifest.features:
+            writer = EpisodeWriter.resume(part, manifest)
+        else:
+            types = read_column_types(row_files(Layout(config.root))[-1])
+            writer = EpisodeWriter.create(part, manifest, overwrite=True, types=types)
+        with writer:
+            for episode in range(first + writer.num_episodes, first + episodes):
+                _draw(dataset, episode, writer, config.seen)
 
 
 def _one_robot(dataset: OpenDataset) -> str:
@@ -83,9 +135,9 @@ def _one_robot(dataset: OpenDataset) -> str:
     return robots.pop()
 
 
-def _render(dataset: OpenDataset, episode: int, writer: EpisodeWriter, seen: Mapping[str, Any]) -> None:
+def _draw(dataset: OpenDataset, episode: int, writer: EpisodeWriter, seen: Mapping[str, Any]) -> None:
     """Add an episode with what its cameras see; one whose replay is not exact is refused."""
-    row, info = dataset.row(episode), dataset.info
+    row = dataset.row(episode)
     names = [key for key, each in writer.features.items() if not each.is_video]
     columns = dataset.frames(episode, [*names, "task_index"])
     numbers = columns.pop("task_index").tolist()
@@ -100,10 +152,11 @@ def _render(dataset: OpenDataset, episode: int, writer: EpisodeWriter, seen: Map
     found, _ = replay_one_of(dataset, episode, seen=seen, observe=observe)
     if found.largest or writer.open_frames != len(tasks):
         writer.discard_episode()
+        trimmed = "its beginning was trimmed, so draw before you trim"
+        why = trimmed if row.get(TRIMMED) else "other versions recorded it, or a robot's client did"
         raise HandrailError(
-            f"episode {episode} of {info.root}: expected an exact replay, got one that deviates by "
-            f"{found.largest:.1e} at {found.names[int(np.argmax(found.deviations))]}: other versions "
-            "recorded it, or a robot's client did"
+            f"episode {episode} of {dataset.info.root}: expected an exact replay, got one that deviates by "
+            f"{found.largest:.1e} at {found.names[int(np.argmax(found.deviations))]}: {why}"
         )
     extras = {name: value for name, value in row.items() if is_extra(name) and value is not None}
     if extras.get(SETTINGS):

@@ -19,6 +19,7 @@ from rich.protocol import is_renderable
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.execution.job import Job, Result, attempt
 from handrail.collect.execution.pool import ProcessPool
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 
@@ -114,13 +115,14 @@ class Execution:
         self._bar.start()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             self._executor.close()
         finally:
             self._bar.stop()
             self._interrupts.__exit__()
-        self._name_slowest_and_failed()
+        if not isinstance(error, HandrailError):  # which says what failed
+            self._name_slowest_and_failed()
 
     def say(self, words: str) -> None:
         """Show how it stands, beside the bar."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import metadata
 from pathlib import Path, PurePosixPath
 from typing import Annotated
@@ -71,6 +72,9 @@ class RobotDescription:
     def camera_names(self) -> tuple[str, ...]:
         """Names of the cameras that can be recorded: its own, and one that overlooks the scene."""
         return (*(camera.name for camera in self.cameras), SCENE_CAMERA)
+
+
+_files_of = cache(metadata.files)  # a thousand paths are looked for
 
 
 def robot_names() -> list[str]:
@@ -267,7 +271,7 @@ def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
         return beside, folder
     distribution = name.parts[0]
     try:
-        files = metadata.files(distribution) or []
+        files = _files_of(distribution) or []
     except metadata.PackageNotFoundError:
         files = []
     for file in files:

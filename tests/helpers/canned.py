@@ -25,8 +25,7 @@ def canned(make: Callable[..., Any], *settings: Any, **named: Any) -> Path:
     """Return the folder that `make(folder, *settings, **named)` has written; tests only read it."""
     key = repr((make.__module__, make.__qualname__, settings, sorted(named.items())))
     if key not in _made:
-        root = Path(_folder().name, str(len(_made)), "set")
-        root.parent.mkdir()
+        root = Path(tempfile.mkdtemp(dir=_folder().name), "set")
         make(root, *settings, **named)
         _made[key] = root
     return _made[key]

@@ -117,10 +117,10 @@ def test_pictures_of_an_older_dataset_may_be_drawn_anew(tmp_path):
 
 
 def films(root):
-    """Return the pictures of each film of a dataset."""
+    """Return the pictures of a dataset's films, in order."""
     for path in sorted(root.rglob("*.mp4")):
         with av.open(str(path)) as container:
-            yield np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
+            yield from (frame.to_ndarray(format="rgb24") for frame in container.decode(video=0))
 
 
 def test_it_is_refused_where_nothing_is_drawn():
