@@ -16,7 +16,7 @@ from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.urdf import mesh_files
 
 _TUBE, _JOINT, _CAP = (0.80, 0.81, 0.83, 1.0), (0.42, 0.44, 0.47, 1.0), (0.32, 0.56, 0.76, 1.0)
-_GRID, _FINE = 1e-3, 10_000  # a mesh of more triangles is drawn with its vertices on a grid [m]
+_GRID, _FINE = 2e-3, 10_000  # a mesh of more triangles is drawn with its vertices on a grid [m]
 _LARGEST = 1e6  # of a coordinate, before it is scaled
 _TRIANGLE = np.dtype([("normal", "<3f4"), ("vertices", "<9f4"), ("attribute", "<u2")])
 
