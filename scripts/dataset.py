@@ -1,8 +1,10 @@
 """Commands that look at datasets, change them and compare them."""
 
+from pathlib import Path
+
 from handrail.collect.commands.config import InspectConfig, PushConfig, RepairConfig
 from handrail.collect.commands.tables import quality_table, summary_table, worst_table
-from handrail.controllers.errors import FAILED
+from handrail.controllers.errors import FAILED, HandrailError
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.editing.config import EditConfig, MergeConfig, PackConfig, packing_advice
 from handrail.datasets.presentation.terminal import Terminal
@@ -59,10 +61,19 @@ def push(config: PushConfig) -> None:
     """Write a dataset's card, print what would be sent, and send it when asked."""
     from handrail.datasets.editing.push import copy, prepare, upload
 
-    dataset = config.dataset
+    dataset, say = config.dataset, Terminal().print
+
+    def preview(root: Path) -> bytes:
+        from handrail.collect.commands import preview
+
+        try:
+            return preview.preview(root)
+        except HandrailError as error:
+            say(f"The card gets no picture: {error}")
+            return b""
+
     settings = config.license, config.private, config.verify, config.to
-    push = prepare(dataset.folder, dataset.repo_id, *settings)
-    say = Terminal().print
+    push = prepare(dataset.folder, dataset.repo_id, *settings, preview)
     say(str(push))
     if advice := packing_advice(dataset.folder):
         say(advice)

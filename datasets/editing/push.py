@@ -6,7 +6,7 @@ stay, and episodes of a user study's participants are not sent at all.
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
@@ -24,15 +24,16 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.load import recorded_episodes
-from handrail.datasets.reading.reader import open_dataset
+from handrail.datasets.reading.reader import open_dataset, read_info
 from handrail.datasets.storage.atomic import explained, write_whole
 
 CARD = "README.md"
+PREVIEW = "meta/preview.webp"
 TAGS = ("handrail", "teleoperation")
 SENT = (
     *("data/chunk-*/file-*.parquet", "videos/*/chunk-*/file-*.mp4", "meta/episodes/chunk-*/file-*.parquet"),
     *("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json"),
-    CARD,
+    *(PREVIEW, CARD),
 )
 _LAST = "meta/info.json"  # without it nobody takes a folder for a dataset
 _PARTICIPANT, _DEVICE = "participant", "teleop.device"
@@ -73,7 +74,13 @@ class Upload:
 
 
 def prepare(
-    root: Path, repo_id: str, license_id: str, private: bool, verify: bool = False, to: str = ""
+    root: Path,
+    repo_id: str,
+    license_id: str,
+    private: bool,
+    verify: bool = False,
+    to: str = "",
+    preview: Callable[[Path], bytes] | None = None,
 ) -> Upload:
     """Check a dataset, write its card, and return what would be sent.
 
@@ -84,10 +91,15 @@ def prepare(
         private: Whether nobody else is to see it.
         verify: Read every byte anew.
         to: Where to, instead of the hub.
+        preview: Draws a picture of a dataset that has none, as WebP; b"" where it cannot.
     """
     root = root.absolute()
     check_whole(root, verify)
     _check_nobody(root)
+    kinds = {feature.dtype for feature in read_info(root).features.values()}
+    if preview and kinds.isdisjoint(("video", "image")) and (picture := preview(root)):
+        with explained(f"cannot write {str(root / PREVIEW)!r}"):
+            write_whole(root / PREVIEW, picture)
     said = _write_card(root, repo_id, license_id)
     names = [path.relative_to(root).as_posix() for path in sorted(root.rglob("*")) if path.is_file()]
     files = [name for name in names if any(fnmatch(name, pattern) for pattern in SENT) and name[0] != "."]
@@ -233,7 +245,8 @@ def _description(root: Path) -> str:
         if values[metric.name][""].known.size
     ]
     table = markdown_table(Table(("metric", "mean", "unit", "meaning"), rows))
-    return f"{_MARK}\n\n{listed}\n\n{_NOTES if info.from_handrail else ''}\n\n{table}"
+    picture = f"![An episode]({PREVIEW})\n\n" if (root / PREVIEW).is_file() else ""
+    return f"{_MARK}\n\n{picture}{listed}\n\n{_NOTES if info.from_handrail else ''}\n\n{table}"
 
 
 def _counted(values: Sequence[object]) -> str:

@@ -1,16 +1,20 @@
 """What goes to the hub when asked: the dataset and its card; nothing else that lies there, nobody."""
 
+import io
 import re
 
 import fsspec
+import numpy as np
 import pytest
 import yaml
-from canned import copied
+from canned import copied, record_by_command
 from command_helpers import command, refused
 from datasets_helpers import CAMERAS, tree
 from editing_helpers import record_episodes
 from fsspec.implementations.memory import MemoryFileSystem
+from PIL import Image, ImageSequence
 
+from handrail.collect.world.gl import missing_graphics
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.reading.check import check_whole
@@ -136,6 +140,45 @@ def test_a_card_is_renewed_but_not_somebody_else_s(root, hub):
     assert "give it another name" in push(root, "--upload", code=2).stderr
     assert (root / "README.md").read_text() == "# Mine"
     assert not hub.sent
+
+
+@pytest.mark.needs_gl
+def test_the_card_of_a_dataset_without_pictures_opens_with_one(tmp_path, hub):
+    """It is small, moves, is sent, and is none of those that an edit leaves behind."""
+    root = copied(tmp_path / "set", record_by_command, "--task reach --seed 3 --dataset.num_episodes 1")
+    push(root, "--upload")
+    description = hub.sent["README.md"].decode().partition("<!-- written by handrail-edit push -->")[2]
+    assert description.startswith("\n\n![An episode](meta/preview.webp)\n")
+    picture = hub.sent["meta/preview.webp"]
+    assert len(picture) < 500_000
+    with Image.open(io.BytesIO(picture)) as film:
+        assert (film.format, film.size) == ("WEBP", (320, 240))
+        shown = [np.array(each.convert("RGB"), dtype=int) for each in ImageSequence.Iterator(film)]
+    assert len(shown) > 20
+    assert np.ptp(shown[0]) > 100
+    assert (np.abs(shown[-1] - shown[0]).max(axis=2) > 60).sum() > 100  # it moves
+    check_whole(root, verify=True)
+    command(root, "--episodes", "0", "--output", tmp_path / "kept", name="edit keep")
+    assert not list(tmp_path.glob("kept/**/preview.webp"))
+
+
+def test_without_opengl_the_card_has_no_picture_and_one_line_says_so(tmp_path, monkeypatch):
+    root = copied(tmp_path / "set", record_by_command, "--task reach --seed 3 --dataset.num_episodes 1")
+
+    def no_library(*_, **__):
+        raise missing_graphics("no libEGL")
+
+    monkeypatch.setattr("handrail.collect.world.env.Painter", no_library)
+    said = push(root).stdout.splitlines()
+    assert said[0].startswith("The card gets no picture: cameras need OpenGL, which is missing here")
+    assert said[1].startswith(f"{root} as me/reach (private): ")
+    assert "preview" not in (root / "README.md").read_text()
+    assert not (root / "meta/preview.webp").exists()
+
+
+def test_the_pictures_of_a_dataset_that_has_some_are_enough(root):
+    assert "no picture" not in push(root).stdout
+    assert not (root / "meta/preview.webp").exists()
 
 
 def test_participants_are_not_sent(tmp_path, hub):
