@@ -128,7 +128,7 @@ GROUPS: Mapping[str, Mapping[str, Program]] = {
                 "render": Verb(
                     "add pictures, drawn while the episodes' commands run again",
                     "collect.commands.config:RenderConfig",
-                    "collect.commands.render:render",
+                    "scripts.dataset:render",
                 ),
                 "pack": Verb(
                     "write a dataset into few large files",

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from handrail.collect.commands.config import InspectConfig, PushConfig, RepairConfig
+from handrail.collect.commands.config import InspectConfig, PushConfig, RenderConfig, RepairConfig
 from handrail.collect.commands.tables import quality_table, summary_table, worst_table
+from handrail.collect.execution.pool import RENDERING, begin_loading
 from handrail.controllers.errors import FAILED, HandrailError
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.editing.config import EditConfig, MergeConfig, PackConfig, packing_advice
@@ -40,6 +41,15 @@ def edit(config: EditConfig) -> None:
     from handrail.datasets.editing.edit import edit
 
     Terminal().print(*map(str, edit(config)), sep="\n")
+
+
+def render(config: RenderConfig) -> None:
+    """Draw the pictures of a dataset's episodes."""
+    if config.is_shared and not config.ray:
+        begin_loading(RENDERING)  # the workers' modules, beside this process's own
+    from handrail.collect.commands.render import render
+
+    render(config)
 
 
 def pack(config: PackConfig | MergeConfig) -> None:

@@ -18,6 +18,7 @@ from handrail.collect.commands.replay import replay_one_of
 from handrail.collect.config import SessionConfig
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
+from handrail.collect.execution.pool import RENDERING
 from handrail.collect.session.recorded import COLUMN as SETTINGS
 from handrail.collect.session.recorded import recorded_settings
 from handrail.collect.world.env import Observation
@@ -37,7 +38,6 @@ from handrail.datasets.recording.slice import TRIMMED
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.atomic import beside, explained, remove
 
-_RENDERING = ("handrail.collect.commands.render",)  # what those that draw have to load
 _FEW = 5  # episodes of a part at least
 _MANY = 1000  # parts at most
 
@@ -52,7 +52,7 @@ def render(config: RenderConfig) -> None:
     folder = beside(config.target, "pictures")
     size = max(_FEW, -(-(end - first) // _MANY))
     jobs = [_job(config, folder, begin, min(size, end - begin)) for begin in range(first, end, size)]
-    with Execution(config, "drawing", Terminal(stderr=True), _RENDERING) as execution:
+    with Execution(config, "drawing", Terminal(stderr=True), RENDERING) as execution:
         for result in execution.run(jobs):
             if result.error:
                 drawn = any(row_files(Layout(job.arguments[1])) for job in jobs)

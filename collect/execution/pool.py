@@ -16,6 +16,7 @@ from multiprocessing.context import ForkServerContext
 from handrail.collect.execution.job import TRIES, Job, Result, attempt_alone
 
 RECORDING = ("handrail.collect.commands.shared",)  # what those that record have to load
+RENDERING = ("handrail.collect.commands.render",)  # and those that draw
 _THREADS = "handrail.collect.execution.preload"
 _MOMENT = 0.2  # [s]
 _GRACE = 10.0  # for what a process saves just now, before it is killed [s]

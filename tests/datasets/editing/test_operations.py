@@ -26,6 +26,7 @@ OURS = {
     "trim": "trim SET --output NEW",
     "relabel": "relabel SET --episodes 0 --label failure --output NEW",
     "rename": "rename SET --task touch --output NEW",
+    "render": "render SET --cameras wrist --image_size 32 --workers 1 --output NEW",
 }
 PACKED = {"pack": "SET --output NEW", "merge": "SET MORE --output NEW"}
 LEROBOTS = {
