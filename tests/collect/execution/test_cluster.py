@@ -10,6 +10,7 @@ import time
 import pytest
 from canned import canned
 from command_helpers import ran, refused
+from datasets_helpers import tree
 from ray_helpers import record_with_a_loss
 from shared_helpers import content, saved, started, wait_until
 
@@ -79,3 +80,12 @@ def test_no_cluster_is_one_line(tmp_path):
     told = "--ray 127.0.0.1:1: expected a running cluster (`ray start --head`)"
     refused(tmp_path / "d", *FLAGS, "--dataset.num_episodes", 1, "--ray", "127.0.0.1:1", told=told)
     assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.needs_gl
+def test_pictures_are_drawn_on_a_cluster_to_the_same_bytes(cluster, tmp_path):
+    for name, where in (("here", ("--workers", 1)), ("there", ("--ray", cluster.address))):
+        look = ("--output", tmp_path / name, "--cameras", "wrist", "--image_size", "32")
+        ran(canned(record), *look, *where, name="edit render")
+    assert tree(tmp_path / "there") == tree(tmp_path / "here")
+    assert sorted(os.listdir(tmp_path)) == ["here", "there"]
