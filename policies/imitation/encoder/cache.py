@@ -18,7 +18,7 @@ from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.encoder.encoder import Encoder
-from handrail.policies.imitation.encoder.memory import Memory
+from handrail.policies.imitation.encoder.memory import SceneMemory
 from handrail.policies.imitation.training.memory import open_pictures
 
 _AT_ONCE = 64  # moments
@@ -48,7 +48,7 @@ def encoded(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encod
 
 
 def _said(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encoder: Encoder) -> FloatArray:
-    pictures, memory = open_pictures(info, [row["episode_index"]], {}), Memory(encoder.reads)
+    pictures, memory = open_pictures(info, [row["episode_index"]], {}), SceneMemory(encoder.reads)
     rows: list[FloatArray] = []
     for start in range(0, len(states), _AT_ONCE):
         part = states[start : start + _AT_ONCE]

@@ -18,7 +18,7 @@ _KEPT = 0.9  # λ, a frame
 _SURPRISE = 4.0  # of what is expected to be off: from there on it begins anew
 
 
-class Memory:
+class SceneMemory:
     """What is known of the objects of one episode.
 
     Args:

@@ -16,7 +16,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import decoded
 from handrail.policies.imitation.encoder.encoder import Encoder, Reads
-from handrail.policies.imitation.encoder.memory import Memory
+from handrail.policies.imitation.encoder.memory import SceneMemory
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
 from handrail.policies.imitation.interface.trust import ENCODE
 
@@ -50,7 +50,7 @@ class PolicyEncoderStep(ProcessorStep):
             if isinstance(shown.get(key := f"{OBS_IMAGES}.{name}"), torch.Tensor)
         }
         said = self.encoder.look(pictures, states)
-        self._memories += [Memory(reads) for _ in states[len(self._memories) :]]
+        self._memories += [SceneMemory(reads) for _ in states[len(self._memories) :]]
         self._forget(shown.get(_TIME))
         moments = zip(self._memories, range(len(states)), strict=False)
         rows = np.stack([memory.take(said, moment) for memory, moment in moments])
@@ -86,7 +86,7 @@ class PolicyEncoderStep(ProcessorStep):
 
     def reset(self) -> None:
         """Forget what was seen."""
-        self._memories: list[Memory] = []
+        self._memories: list[SceneMemory] = []
         self._times = np.zeros(0)
 
 

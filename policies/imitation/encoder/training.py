@@ -28,7 +28,7 @@ _WARMUP = 200  # updates
 _FALL = 0.6  # share of the updates from which on the learning rate falls, along a cosine
 _AVERAGED = 0.998  # of the weights, an update
 _MEASURED = 2**31  # number of the first chunk that is only measured on
-_CHUNKS = 6
+_CHUNKS = 4
 _SAVED = 200  # updates
 _SHIFT = 0.02  # of a picture's height: by so much it is shifted at most
 

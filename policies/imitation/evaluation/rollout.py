@@ -26,7 +26,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
-from handrail.policies.imitation.encoder.memory import Memory
+from handrail.policies.imitation.encoder.memory import SceneMemory
 from handrail.policies.imitation.evaluation.conditions import (
     Checkpoint,
     PolicyCondition,
@@ -90,7 +90,7 @@ class PolicyOperator:
     ) -> None:
         self._policy, self._interface, self._mode, self._task = policy, interface, mode, task
         self._unusable = Intent(np.full(channels.size, np.nan), np.ones(channels.size, bool))
-        self._memory = Memory(policy.encoder.reads) if policy.encoder else None
+        self._memory = SceneMemory(policy.encoder.reads) if policy.encoder else None
         self.malformed = 0
 
     def reset(self, view: View, rng: np.random.Generator) -> None:

@@ -11,7 +11,7 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, session_features
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.encoder.encoder import Encoder, Reads, Said, find_encoder, same
-from handrail.policies.imitation.encoder.memory import Memory
+from handrail.policies.imitation.encoder.memory import SceneMemory
 from handrail.policies.imitation.encoder.network import Network
 from handrail.policies.imitation.encoder.step import encoder_step
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
@@ -41,7 +41,7 @@ def moments(count=3, seed=0):
 def test_it_tells_of_what_has_a_pose_or_a_position_and_of_nothing_else():
     said, (pictures, states) = encoder(), moments()
     assert [name for name, _, _ in said.reads.objects] == ["cube", "bin", "cube_table", "bin_table"]
-    numbers = Memory(said.reads).take(said.look(pictures, states), 0)
+    numbers = SceneMemory(said.reads).take(said.look(pictures, states), 0)
     names = said.reads.interface.environment_names
     zero = {name.split(".")[0] for name, value in zip(names, numbers, strict=True) if value == 0.0}
     assert zero == {"obstacle_0", "obstacle_1", "obstacle_2"}
@@ -113,7 +113,7 @@ def remembered(memory, of_cube):
 
 
 def test_what_is_said_again_and_again_becomes_surer():
-    memory, rng = Memory(reads()), np.random.default_rng(0)
+    memory, rng = SceneMemory(reads()), np.random.default_rng(0)
     for _ in range(50):
         now = remembered(memory, said([1.0, 2.0, 0.5] + rng.normal(0, 0.05, 3), 0.1, np.eye(3)))
     assert np.linalg.norm(now[:3] - [1.0, 2.0, 0.5]) < 0.04
@@ -121,20 +121,20 @@ def test_what_is_said_again_and_again_becomes_surer():
 
 
 def test_what_is_surer_counts_more():
-    memory = Memory(reads())
+    memory = SceneMemory(reads())
     remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
     assert remembered(memory, said([1.02, 0.0, 0.0], 0.1, np.eye(3)))[0] < 1.001
 
 
 def test_what_moved_is_known_anew_at_once():
-    memory = Memory(reads())
+    memory = SceneMemory(reads())
     for _ in range(20):
         remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
     np.testing.assert_allclose(remembered(memory, said([2.0, 0.0, 0.0], 0.01, np.eye(3)))[0], 2.0)
 
 
 def test_a_quarter_turn_of_a_cube_is_no_turn():
-    memory, quarter = Memory(reads()), same(4)[1]
+    memory, quarter = SceneMemory(reads()), same(4)[1]
     first = remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
     np.testing.assert_allclose(remembered(memory, said([1.0, 0.0, 0.0], 0.01, quarter)), first, atol=1e-6)
 
@@ -149,7 +149,7 @@ def test_in_a_checkpoint_it_says_the_same(tmp_path):
         for name, each in pictures.items()
     }
     shown = images | {STATE: torch.from_numpy(states), ENVIRONMENT: torch.zeros(2, 28)}
-    memories = [Memory(one.reads), Memory(one.reads)]
+    memories = [SceneMemory(one.reads), SceneMemory(one.reads)]
     for times in ([0.0, 0.0], [0.05, 0.05], [0.10, 0.0]):
         if times[1] == 0.0:
             memories[1].forget()
@@ -161,7 +161,7 @@ def test_in_a_checkpoint_it_says_the_same(tmp_path):
     step.reset()
     found = step({"observation": joined})["observation"]
     assert found[STATE].shape == (2, states.shape[1])
-    np.testing.assert_array_equal(found[ENVIRONMENT][0], Memory(one.reads).take(told, 0))
+    np.testing.assert_array_equal(found[ENVIRONMENT][0], SceneMemory(one.reads).take(told, 0))
 
 
 def test_eyes_of_large_pictures_halve_them_more():

@@ -1,0 +1,159 @@
+"""An encoder that learns, for a few updates, from small pictures; and a policy that looks through it."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import torch
+from canned import record_by_command
+from lerobot.configs.policies import PreTrainedConfig
+from lerobot.policies.factory import make_pre_post_processors
+
+from handrail.collect.config import StoredConfig
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.reading.reader import open_dataset
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.encoder.config import EncoderConfig
+from handrail.policies.imitation.encoder.encoder import Encoder
+from handrail.policies.imitation.encoder.samples import DRIVEN, ELSEWHERE, START, Drawn, batches
+from handrail.policies.imitation.encoder.training import train
+from handrail.policies.imitation.evaluation.conditions import read_checkpoint
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.evaluation.evaluation import evaluate
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.training.source import read_source
+from handrail.policies.imitation.training.training import train as train_policy
+
+pytestmark = pytest.mark.needs_gl
+SIZE = 48
+
+
+def config(tmp_path, **settings):
+    return EncoderConfig(
+        **{"output": str(tmp_path / "e.safetensors"), "image_size": SIZE, "workers": 0, "updates": 3}
+        | settings
+    )
+
+
+def test_a_chunk_comes_from_its_number_alone(tmp_path):
+    first, again = Drawn(config(tmp_path)), Drawn(config(tmp_path))
+    again[0]
+    one, same = first[1], again[1]
+    for name, values in one.items():
+        np.testing.assert_array_equal(values, same[name])
+    assert {START, DRIVEN, ELSEWHERE} <= set(one["kind"])
+    assert one["front"].shape == (len(one["kind"]), SIZE, SIZE, 3)
+    assert not np.array_equal(one["environment"][0], Drawn(config(tmp_path, seed=1))[1]["environment"][0])
+
+
+def test_where_the_robot_is_says_nothing_of_a_scene_elsewhere(tmp_path):
+    """Its samples show robots of other episodes: the same scene from several of their poses."""
+    chunk = Drawn(config(tmp_path))[0]
+    elsewhere = chunk["kind"] == ELSEWHERE
+    scenes, poses = chunk["environment"][elsewhere], chunk["state"][elsewhere]
+    assert len(np.unique(scenes, axis=0)) < len(np.unique(poses, axis=0))
+    driven = chunk["environment"][chunk["kind"] == DRIVEN]
+    assert not set(map(bytes, scenes)) & set(map(bytes, driven))
+
+
+def test_batches_come_as_often_as_is_said():
+    chunks = ({"kind": np.arange(10) + 10 * number} for number in range(20))
+    found = list(batches(chunks, 5, 1.5, 40, 0))
+    assert len(found) == 60
+    assert all(len(batch["kind"]) == 5 for batch in found)
+    assert found[-1]["kind"].min() >= 150
+
+
+def test_an_encoder_learns_and_goes_on(tmp_path, capsys):
+    train(config(tmp_path))
+    before = Encoder.load(tmp_path / "e.safetensors")
+    train(config(tmp_path, updates=6))
+    after = Encoder.load(tmp_path / "e.safetensors")
+    assert before.digest != after.digest
+    state = torch.load(tmp_path / "e.training", weights_only=True)
+    assert state["at"][0] == 6
+    assert "goal" in capsys.readouterr().out
+    with pytest.raises(HandrailError, match="other settings; say --overwrite"):
+        train(config(tmp_path, lr=1e-4))
+    assert Drawn(config(tmp_path)).reads == after.reads
+
+
+@pytest.fixture(scope="module")
+def looking(tmp_path_factory):
+    """Return a dataset with pictures, an encoder that has hardly learnt, and a policy trained with it."""
+    folder = tmp_path_factory.mktemp("looking")
+    train(config(folder))
+    line = f"--task reach --mode ee --cameras front,wrist --image_size {SIZE} --dataset.num_episodes 2"
+    record_by_command(folder / "data", line)
+    settings = TrainConfig(
+        dataset=StoredConfig(root=str(folder / "data")),
+        encoder=str(folder / "e.safetensors"),
+        output=str(folder / "policy"),
+        steps=2,
+    )
+    return folder, settings, train_policy(settings, quiet=True)
+
+
+def test_a_policy_learns_what_the_encoder_says(looking):
+    folder, settings, _ = looking
+    encoder = Encoder.load(folder / "e.safetensors")
+    source, told = read_source(settings), read_source(dataclasses.replace(settings, encoder=""))
+    assert source.features == told.features
+    np.testing.assert_array_equal(source.columns[STATE], told.columns[STATE])
+    assert not np.allclose(source.columns[ENVIRONMENT], told.columns[ENVIRONMENT], atol=0.1)
+    assert source.digest != told.digest
+    again = read_source(settings)  # from the cache
+    np.testing.assert_array_equal(source.columns[ENVIRONMENT], again.columns[ENVIRONMENT])
+    assert source.encoder is not None
+    assert source.encoder.digest == encoder.digest
+
+
+def test_anybody_can_run_it(looking):
+    """LeRobot's own loader brings the encoder along, with its weights."""
+    folder, _, place = looking
+    policy = PreTrainedConfig.from_pretrained(place)
+    before, _ = make_pre_post_processors(policy, str(place))
+    assert "handrail_policy_encoder" in [type(step)._registry_name for step in before.steps]
+    with open_dataset(folder / "data") as dataset:
+        state = dataset.frames(0, [STATE])[STATE][:1]
+    images = {f"observation.images.{name}": torch.rand(1, 3, SIZE, SIZE) for name in ("front", "wrist")}
+    first = before(images | {STATE: torch.from_numpy(state)})
+    told = before(images | {STATE: torch.from_numpy(state), ENVIRONMENT: torch.full((1, 7), 9.0)})
+    assert torch.isfinite(first[ENVIRONMENT]).all()
+    torch.testing.assert_close(first[ENVIRONMENT], told[ENVIRONMENT])  # whatever is told
+
+
+def test_other_pictures_are_shown(looking, tmp_path):
+    _, _, place = looking
+    asked = EvaluateConfig(
+        checkpoints=(str(place),),
+        episodes=1,
+        perturbation="none,blank,swap",
+        time_limit=1.0,
+        json=str(tmp_path / "e.json"),
+        workers=1,
+    )
+    assert read_checkpoint(place, asked).pictures == {"front": (SIZE, SIZE), "wrist": (SIZE, SIZE)}
+    arms = evaluate(asked)["arms"]
+    assert list(arms) == ["ee", "ee cameras blank", "ee pictures of another episode"]
+    assert json.loads((tmp_path / "e.json").read_text())["arms"].keys() == arms.keys()
+
+
+def test_saliency_is_where_the_thing_is():
+    """With a network that looks at one place only, that place is red."""
+    drawn = Drawn(EncoderConfig(image_size=SIZE))
+    encoder = Encoder(drawn.reads)
+    pictures = {name: np.zeros((SIZE, SIZE, 3), np.uint8) for name in ("front", "wrist")}
+
+    class Corner(torch.nn.Module):
+        def forward(self, shown, state):
+            bright = shown["front"][:, :, 5, 40].sum(1) + 0.0 * shown["wrist"].sum()
+            return bright[:, None] * torch.ones(1, encoder.reads.size)
+
+    blind = Encoder(drawn.reads, Corner())
+    state = np.zeros(len(drawn.reads.interface.state_names))
+    state[drawn.reads.interface.state_names.index("tool.qw")] = 1.0
+    heat = blind.saliency(pictures, state)["front"]
+    assert np.unravel_index(heat.argmax(), heat.shape) == (5, 40)
+    assert heat.max() == pytest.approx(1.0)
