@@ -24,7 +24,7 @@ from handrail.collect.world.observation import AgentObservation
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.encoder.config import EncoderConfig
-from handrail.policies.imitation.encoder.encoder import Reads
+from handrail.policies.imitation.interface.encoder import Reads
 from handrail.policies.imitation.interface.interface import PolicyInterface
 
 FPS = 20

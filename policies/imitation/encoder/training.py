@@ -17,8 +17,8 @@ from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.policies.imitation.encoder.config import EncoderConfig
-from handrail.policies.imitation.encoder.encoder import Encoder, same
 from handrail.policies.imitation.encoder.samples import DRIVEN, START, Drawn, Samples, batches
+from handrail.policies.imitation.interface.encoder import Encoder, same
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.relative import POSE, rotations
 from handrail.policies.imitation.interface.trained import threads

@@ -15,11 +15,11 @@ from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
-from handrail.policies.imitation.encoder.encoder import Encoder
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.file import EvaluationFile
 from handrail.policies.imitation.evaluation.rollout import Load, run_rollout
+from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.trained import load_policy
 
 _PRELOAD = ("handrail.policies.imitation.evaluation.rollout",)

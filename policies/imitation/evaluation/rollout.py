@@ -26,7 +26,6 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
-from handrail.policies.imitation.encoder.memory import SceneMemory
 from handrail.policies.imitation.evaluation.conditions import (
     Checkpoint,
     PolicyCondition,
@@ -34,6 +33,7 @@ from handrail.policies.imitation.evaluation.conditions import (
     own_protection,
 )
 from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.trained import TrainedPolicy, repeatable, threads
 
 Load = Callable[[Path], TrainedPolicy]

@@ -32,15 +32,15 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.typed import Name, decoded
-from handrail.policies.imitation.encoder.encoder import Encoder
-from handrail.policies.imitation.encoder.step import (
+from handrail.policies.imitation.interface.checkpoint import Fps
+from handrail.policies.imitation.interface.encoder import Encoder
+from handrail.policies.imitation.interface.encoder_step import (
     PolicyEncoderStep,
     encoder_step,
     numbers_of,
     shape_of,
     size_of,
 )
-from handrail.policies.imitation.interface.checkpoint import Fps
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import ACT, COMPLETE, VIEW
 

@@ -16,9 +16,9 @@ from safetensors.torch import load_model
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.policies.imitation.encoder.encoder import Encoder
-from handrail.policies.imitation.encoder.step import encoder_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
+from handrail.policies.imitation.interface.encoder import Encoder
+from handrail.policies.imitation.interface.encoder_step import encoder_of
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
 from handrail.policies.imitation.interface.steps import without_steps
 from handrail.policies.imitation.interface.trust import WEIGHTS, check_policy_folder, registered_policies

@@ -33,8 +33,8 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import publish_folder
-from handrail.policies.imitation.encoder.encoder import Encoder
 from handrail.policies.imitation.interface.checkpoint import MODEL, PolicyMeta, point_to, write_meta
+from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.steps import Completion, with_steps, without_steps
 from handrail.policies.imitation.interface.trained import check_numbers, load_weights
 from handrail.policies.imitation.training.curve import Curve, read_sums, write_sums

@@ -18,9 +18,8 @@ from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 from handrail.policies.imitation.config import TrainConfig
-from handrail.policies.imitation.encoder.cache import encoded
-from handrail.policies.imitation.encoder.encoder import Encoder, find_encoder
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta
+from handrail.policies.imitation.interface.encoder import Encoder, find_encoder
 from handrail.policies.imitation.interface.interface import (
     ACTION,
     COLUMNS,
@@ -29,6 +28,7 @@ from handrail.policies.imitation.interface.interface import (
     STATE,
     PolicyInterface,
 )
+from handrail.policies.imitation.training.encoded import encoded
 from handrail.policies.imitation.training.memory import (
     PICTURES,
     MemoryDataset,

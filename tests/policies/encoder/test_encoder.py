@@ -10,11 +10,11 @@ from safetensors.torch import save_file
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, session_features
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.encoder.encoder import Encoder, Reads, Said, find_encoder, same
-from handrail.policies.imitation.encoder.memory import SceneMemory
-from handrail.policies.imitation.encoder.network import Network
-from handrail.policies.imitation.encoder.step import encoder_step
+from handrail.policies.imitation.interface.encoder import Encoder, Reads, Said, find_encoder, same
+from handrail.policies.imitation.interface.encoder_step import encoder_step
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
+from handrail.policies.imitation.interface.network import Network
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
 
 SIZE = (32, 48)
 
@@ -69,7 +69,7 @@ def test_what_it_says_moves_with_the_robot():
     one.network.spread[:] = 1e9  # the state itself says nothing
     here, there = one.look(pictures, states)["cube"], one.look(pictures, elsewhere)["cube"]
     np.testing.assert_allclose(there.position - here.position, [[1.0, 0.0, 0.0]], atol=1e-5)
-    np.testing.assert_allclose(there.rotation, here.rotation, atol=1e-6)
+    np.testing.assert_allclose(np.array(there.rotation), np.array(here.rotation), atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handrail.controllers.arrays import FloatArray
-from handrail.policies.imitation.encoder.encoder import Reads, Said, same
+from handrail.policies.imitation.interface.encoder import Reads, Said, same
 
 _KEPT = 0.9  # λ, a frame
 _SURPRISE = 4.0  # of what is expected to be off: from there on it begins anew

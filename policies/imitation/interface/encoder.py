@@ -28,14 +28,14 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.controllers.typed import Count, Name, decoded
 from handrail.datasets.storage.atomic import write_whole
-from handrail.policies.imitation.encoder.network import Network
 from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.network import Network
 from handrail.policies.imitation.interface.relative import POSE, POSITION, RobotPose
 
 _SMOOTH = 40.0  # of a saliency: a picture's height over the standard deviation
 _FINEST = 2e-3  # b and b_r are at least that [m, 1]
 _SAID = {POSITION: 4, POSE: 11}  # numbers that the network says: d, b; and M, b_r
-OWN = Path(__file__).parent / "weights"
+OWN = Path(__file__).parents[1] / "encoder" / "weights"
 FORMAT = "handrail.encoder/1"
 
 

@@ -17,8 +17,8 @@ from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.atomic import write_whole
-from handrail.policies.imitation.encoder.encoder import Encoder
-from handrail.policies.imitation.encoder.memory import SceneMemory
+from handrail.policies.imitation.interface.encoder import Encoder
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.training.memory import open_pictures
 
 _AT_ONCE = 64  # moments

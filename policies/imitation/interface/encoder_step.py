@@ -15,9 +15,9 @@ from lerobot.utils.constants import OBS_IMAGES
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import decoded
-from handrail.policies.imitation.encoder.encoder import Encoder, Reads
-from handrail.policies.imitation.encoder.memory import SceneMemory
+from handrail.policies.imitation.interface.encoder import Encoder, Reads
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.trust import ENCODE
 
 _TIME = "observation.time"
