@@ -68,7 +68,7 @@ class Painter:
         visual = model.vis
         visual.global_.offheight, visual.global_.offwidth = self._size
         visual.quality.shadowsize, visual.quality.offsamples = (4096, 8) if self._pretty else (0, 0)
-        if not self._pretty and not _bulges(model):
+        if not self._pretty and not bulges(model):
             visual.quality.numstacks = 2  # a cylinder's bands look the same
         drawn = _drawn(model)
         if self._loaded is None or drawn != self._drawn:
@@ -114,6 +114,6 @@ def _drawn(model: MjModel) -> tuple[bytes, ...]:
     return (*(each.tobytes() for each in (*arrays, planes)), bytes([model.vis.quality.numstacks]))
 
 
-def _bulges(model: MjModel) -> bool:
+def bulges(model: MjModel) -> bool:
     """Whether something that is drawn is round in two directions."""
     return bool(np.isin(model.geom_type[model.geom_group == VISIBLE_GROUP], _BULGING).any())

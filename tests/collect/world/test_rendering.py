@@ -52,7 +52,7 @@ def test_bands_that_are_spared_cannot_be_seen(robot, monkeypatch):
     env = build_env(SessionConfig(task="pick_place", robot=robot, cameras="all"), 20)
     spared = env.reset(seed=3)[0]["pixels"]
     assert env.simulation.mujoco_model.vis.quality.numstacks == 2
-    monkeypatch.setattr(rendering, "_bulges", lambda model: True)
+    monkeypatch.setattr(rendering, "bulges", lambda model: True)
     whole = env.reset(seed=3)[0]["pixels"]
     assert env.simulation.mujoco_model.vis.quality.numstacks > 2
     env.close()
@@ -61,7 +61,7 @@ def test_bands_that_are_spared_cannot_be_seen(robot, monkeypatch):
 
 
 @pytest.mark.needs_gl
-def test_what_bulges_stays_round():
+def test_whatbulges_stays_round():
     text = """<mujoco><worldbody>
         <camera name='eye' pos='0 -5 0' euler='90 0 0'/>
         <geom type='sphere' size='1' group='1' rgba='1 1 1 1'/>
