@@ -16,6 +16,7 @@ from typing import Any
 import av
 import av.error
 import numpy as np
+from numpy.typing import NDArray
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
@@ -93,17 +94,24 @@ def decoded_stats(path: Path, frames: int, camera: Feature, first: int = 0, fps:
         first: The picture that the stretch begins with.
         fps: Pictures a second [Hz]; 0 if these must be all pictures of the file.
     """
-    levels: list[np.ndarray] = []
+    return image_stats([image_levels(each) for each in decoded(path, frames, camera, first, fps)])
+
+
+def decoded(
+    path: Path, frames: int, camera: Feature, first: int = 0, fps: int = 0
+) -> Iterator[NDArray[np.uint8]]:
+    """Yield every picture of an mp4, or of a stretch of one, (height, width, 3); see `decoded_stats`."""
+    count = 0
     with whole_mp4(path), av.open(str(regular(path))) as container:
         stream = sought(container, first, fps)
         stream.codec_context.options = {"err_detect": "explode"}
         for frame in _stretch(container, stream, first, frames, fps):
             if frame.is_corrupt or (frame.height, frame.width) != camera.shape[:2]:
-                raise ValueError(f"a broken picture {len(levels)}, or one of another size")
-            levels.append(image_levels(frame.to_ndarray(format="rgb24")))
-    if len(levels) != frames:
-        raise HandrailError(f"video {str(path)!r}: expected {frames} pictures, got {len(levels)}")
-    return image_stats(levels)
+                raise ValueError(f"a broken picture {count}, or one of another size")
+            yield frame.to_ndarray(format="rgb24")
+            count += 1
+    if count != frames:
+        raise HandrailError(f"video {str(path)!r}: expected {frames} pictures, got {count}")
 
 
 def encode_stretch(source: Path, first: int, count: int, target: Path, fps: int, camera: Feature) -> None:

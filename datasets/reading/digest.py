@@ -44,13 +44,18 @@ def digest_of_pictures(info: DatasetInfo, rows: Iterable[Mapping[str, Any]]) -> 
     return digest.hexdigest()[:16] if cameras else ""
 
 
+def video_of(info: DatasetInfo, row: Mapping[str, Any], camera: str) -> tuple[Path, int]:
+    """Return the file of a camera's pictures of an episode, and which of them is the episode's first."""
+    chunk, file, start = (
+        row[f"videos/{camera}/{name}"] for name in ("chunk_index", "file_index", "from_timestamp")
+    )
+    return info.root / fill(info.video_path, chunk, file, camera), round(start * info.fps)
+
+
 def _encoded(
     info: DatasetInfo, row: Mapping[str, Any], camera: str, opened: Videos
 ) -> Iterable[bytes | memoryview]:
     """Return an episode's packets; all of the file where another tool encoded episodes into each other."""
-    chunk, file, start = (
-        row[f"videos/{camera}/{name}"] for name in ("chunk_index", "file_index", "from_timestamp")
-    )
-    path = info.root / fill(info.video_path, chunk, file, camera)
-    stretch = opened.stretch(path, round(start * info.fps), row["length"], camera)
+    path, first = video_of(info, row, camera)
+    stretch = opened.stretch(path, first, row["length"], camera)
     return [memoryview(packet) for packet in stretch.packets] if stretch else [path.read_bytes()]

@@ -2,24 +2,24 @@
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
+from numpy.typing import NDArray
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.reading.digest import digest_of_pictures
+from handrail.datasets.format.video import decoded
+from handrail.datasets.reading.digest import digest_of_pictures, video_of
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
-from handrail.policies.imitation.training.memory import open_pictures
 
 _AT_ONCE = 64  # moments
 _FOLDER = "encoded"
@@ -42,23 +42,24 @@ def encoded(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encod
     name = digest_of_pictures(info, [row]) + hashlib.sha256(states.tobytes()).hexdigest()[:16]
     path = folder / encoder.digest / f"{name}.npy"
     if not path.is_file():
-        Terminal(stderr=True).print(f"reading the pictures of episode {row['episode_index']}", end="\r")
         _write(path, _said(info, row, states, encoder))
     return np.load(path, allow_pickle=False)
 
 
 def _said(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encoder: Encoder) -> FloatArray:
-    pictures, memory = open_pictures(info, [row["episode_index"]], {}), SceneMemory(encoder.reads)
-    rows: list[FloatArray] = []
+    memory, rows = SceneMemory(encoder.reads), list[FloatArray]()
+    videos = {name: _pictures(info, row, PICTURE + name) for name in encoder.reads.cameras}
     for start in range(0, len(states), _AT_ONCE):
         part = states[start : start + _AT_ONCE]
-        samples: list[Any] = [pictures[start + place] for place in range(len(part))]
-        seen = {
-            name: torch.stack([each[PICTURE + name] for each in samples]) for name in encoder.reads.cameras
-        }
-        said = encoder.look(seen, part)
+        shown = {name: np.stack(list(islice(video, len(part)))) for name, video in videos.items()}
+        said = encoder.look(shown, part)
         rows += [memory.take(said, moment) for moment in range(len(part))]
     return np.stack(rows)
+
+
+def _pictures(info: DatasetInfo, row: Mapping[str, Any], camera: str) -> Iterator[NDArray[np.uint8]]:
+    path, first = video_of(info, row, camera)
+    return decoded(path, row["length"], info.features[camera], first, info.fps)
 
 
 def _write(path: Path, values: FloatArray) -> None:
