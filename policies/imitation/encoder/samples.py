@@ -71,8 +71,9 @@ class Drawn:
         interface = PolicyInterface.of_dataset(features, (), "realised")
         env.reset(seed=0)
         turns = {item.name: item.turns for item in env.start.scene.objects if item.turns > 1}
+        movable = tuple(item.name for item in env.start.scene.objects if item.movable)
         cameras = dict.fromkeys(self._camera_names, env.image_size)
-        return Reads(self.config.robot, self.config.task, cameras, interface, turns)
+        return Reads(self.config.robot, self.config.task, cameras, interface, turns, movable)
 
     @property
     def _camera_names(self) -> tuple[str, ...]:

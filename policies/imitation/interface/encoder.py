@@ -51,6 +51,8 @@ class Reads:
     """Names of the recorded numbers, and the robot's state as policies read it."""
     turns: Mapping[Name, Count]
     """Objects that look the same after so many-th of a turn around their z axis."""
+    movable: tuple[Name, ...] = ()
+    """Objects that may move; the others stand."""
 
     @cached_property
     def objects(self) -> tuple[tuple[str, tuple[str, ...], int], ...]:

@@ -1,9 +1,10 @@
-"""What was said before is remembered, in the world's axes, for as long as it fits.
+"""What was said before is remembered, in the world's axes: a Kalman filter of an object that stands or moves.
 
-    x ← (λ w x + v y) / (λ w + v)     with the weight v = 1 / b² of what is said now
-    w ← λ w + v                       of all before
+    P ← P + q                          while time passes: q is small for what stands
+    K = P / (P + b²)                   b: how far what is said now is off
+    x ← x + K (y − x),  P ← (1 − K) P
 
-What is far from all before begins anew: it moved, or it is another episode.
+What is far from what is known counts only when it is said again and again: P grows meanwhile, until it fits.
 """
 
 from collections.abc import Mapping
@@ -14,8 +15,10 @@ from scipy.spatial.transform import Rotation
 from handrail.controllers.arrays import FloatArray
 from handrail.policies.imitation.interface.encoder import Reads, Said, same
 
-_KEPT = 0.9  # λ, a frame
-_SURPRISE = 4.0  # of what is expected to be off: from there on it begins anew
+_STANDS, _MOVES = (0.005, 0.02), (0.02, 0.10)  # √q, a frame: of the place [m], of the turn
+_FAR = 4.0  # standard deviations
+_DOUBT = 1.2  # by which P grows where what is said is farther
+VERSION = 2  # of all this: what was kept of another one is not read again
 
 
 class SceneMemory:
@@ -31,7 +34,10 @@ class SceneMemory:
 
     def forget(self) -> None:
         """Forget all: an episode begins."""
-        self._known = {name: _Known(self._reads.turns.get(name, 1)) for name, _, _ in self._reads.objects}
+        reads = self._reads
+        self._known = {
+            name: _Known(reads.turns.get(name, 1), name in reads.movable) for name, _, _ in reads.objects
+        }
 
     def take(self, said: Mapping[str, Said], moment: int) -> FloatArray:
         """Take what is said at a moment, and return the environment's state as it is known, (e,) float32."""
@@ -46,28 +52,54 @@ class _Known:
 
     Args:
         turns: it looks the same after so many-th of a turn around its z axis.
+        movable: whether it may move.
     """
 
-    def __init__(self, turns: int) -> None:
+    def __init__(self, turns: int, movable: bool) -> None:
         self._same = same(turns)
-        self._weight, self._place = 0.0, np.zeros(3)
-        self._turn_weight, self._turn = 0.0, np.eye(3)
+        self._place, self._turn = np.zeros(3), np.eye(3)
+        place, turn = _MOVES if movable else _STANDS
+        self._sure, self._turn_sure = _Variance(place), _Variance(turn)
 
     def take(self, said: Said, moment: int) -> FloatArray:
         """Take what is said at a moment; return position, and quaternion if it has one, (3,) or (7,)."""
-        place, off = said.position[moment], said.off[moment]
-        surprise = np.linalg.norm(place - self._place)
-        if self._weight and surprise > _SURPRISE * np.hypot(off, self._weight**-0.5):
-            self._weight = self._turn_weight = 0.0
-        before, now = _KEPT * self._weight, off**-2.0
-        self._weight = before + now
-        self._place = (before * self._place + now * place) / self._weight
+        away = said.position[moment] - self._place
+        self._place = self._place + self._sure.share(float(np.linalg.norm(away)), said.off[moment]) * away
         if said.rotation is None or said.turned_off is None:
             return self._place
         ways = said.rotation[moment] @ self._same
-        turn = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]
-        before, now = _KEPT * self._turn_weight, said.turned_off[moment] ** -2.0
-        self._turn_weight = before + now
-        mixed = Rotation.from_matrix(np.stack([self._turn, turn])).mean([before, now])
-        self._turn = mixed.as_matrix()
-        return np.append(self._place, mixed.as_quat(canonical=True, scalar_first=True))
+        nearest = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]
+        turn = Rotation.from_matrix(nearest @ self._turn.T).as_rotvec()
+        share = self._turn_sure.share(float(np.linalg.norm(turn)), said.turned_off[moment])
+        now = Rotation.from_rotvec(share * turn) * Rotation.from_matrix(self._turn)
+        self._turn = now.as_matrix()
+        return np.append(self._place, now.as_quat(canonical=True, scalar_first=True))
+
+
+class _Variance:
+    """P: how far off what is known is, squared.
+
+    Args:
+        drift: √q.
+    """
+
+    def __init__(self, drift: float) -> None:
+        self._drift, self._variance = drift, np.inf
+
+    def share(self, away: float, off: float) -> float:
+        """Return K for what is said; 0 where it is too far away to be believed.
+
+        Args:
+            away: how far it is from what is known.
+            off: b.
+        """
+        self._variance += self._drift**2
+        if np.isinf(self._variance):
+            self._variance = off**2
+            return 1.0
+        if away**2 > _FAR**2 * (self._variance + off**2):
+            self._variance *= _DOUBT
+            return 0.0
+        share = self._variance / (self._variance + off**2)
+        self._variance *= 1.0 - share
+        return float(share)

@@ -19,7 +19,7 @@ from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.interface.encoder import Encoder
-from handrail.policies.imitation.interface.scene_memory import SceneMemory
+from handrail.policies.imitation.interface.scene_memory import VERSION, SceneMemory
 
 _AT_ONCE = 64  # moments
 _FOLDER = "encoded"
@@ -40,7 +40,7 @@ def encoded(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encod
         raise HandrailError(f"dataset {str(info.root)!r}: {words}; handrail-edit render draws them")
     folder = Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser() / "handrail" / _FOLDER
     name = digest_of_pictures(info, [row]) + hashlib.sha256(states.tobytes()).hexdigest()[:16]
-    path = folder / encoder.digest / f"{name}.npy"
+    path = folder / f"{encoder.digest}-{VERSION}" / f"{name}.npy"
     if not path.is_file():
         _write(path, _said(info, row, states, encoder))
     return np.load(path, allow_pickle=False)
