@@ -118,7 +118,7 @@ def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
     [
         (("--robot_client", "lawnmower"), "unknown --robot_client 'lawnmower': expected one of lekiwi"),
         (("--robot_client", "lekiwi", "--operator", "browser"), "expected another --operator"),
-        (("--robot_client", "lekiwi", "--no_physics"), "expected neither"),
+        (("--robot_client", "lekiwi", "--no_physics"), "expected none of"),
         (("--client.simulated",), "expected --robot_client too"),
         (("--robot_client", "lekiwi", "--client.port_zmq_cmd", "0"), "expected a whole number >= 1"),
     ],
