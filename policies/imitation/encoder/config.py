@@ -43,6 +43,8 @@ class EncoderConfig:
     """Highest learning rate."""
     seed: Count = 0
     """Of the scenes and the first weights."""
+    device: Advanced[str] = "cpu"
+    """Where it learns: cpu, cuda, mps."""
     workers: Advanced[Count] = 1
     """Processes that draw scenes; 0 draws them in between."""
     threads: Advanced[AtLeastOne] = 1

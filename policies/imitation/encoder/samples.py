@@ -5,7 +5,10 @@ They are drawn, never stored. Of a chunk,
 - some are moments of episodes that a script drives, in several teleop modes: also with the cube in hand,
 - some the same moments with the robot moved a little, so that it is not always on its way,
 - some are scenes of other episodes, seen by the robot where it was in these: so that where the hand is says
-  nothing about where things are.
+  nothing about where things are,
+- some of these with the robot astray, so that it knows how little it sees there.
+
+A part of the chunks has other light, colours and camera poses each time.
 """
 
 from collections import deque
@@ -30,12 +33,13 @@ from handrail.policies.imitation.interface.interface import PolicyInterface
 FPS = 20
 _DRIVEN = ("ee", "direct")  # modes of the scripts
 _EPISODES = 3  # of a chunk
-_OWN, _MOVED = 0.06, 0.03  # share of an episode's frames
-_POSES = 3  # at which a scene is seen
-_AWAY = 0.1  # standard deviation by which the robot is moved [m · scale/2, rad]
+_OWN, _MOVED = 0.08, 0.04  # share of an episode's frames
+_POSES = 5  # at which a scene is seen
+_NEAR, _ASTRAY = 0.1, 0.5  # standard deviation by which the robot is moved [m · scale/2, rad]
+_RANDOMISED = 4  # every so-many-th chunk
 Samples = dict[str, np.ndarray]
-START, DRIVEN, MOVED, ELSEWHERE = range(4)
-"""What kind of moment a sample is, in `kind`."""
+START, DRIVEN, OTHER = range(3)
+"""What kind of moment a sample is, in `kind`: START and DRIVEN are as a policy sees them."""
 
 
 @dataclass
@@ -48,18 +52,24 @@ class Drawn:
         """Return a chunk: pictures by camera, `state`, `environment`, `kind`; (N, …) each."""
         rng = np.random.default_rng([self.config.seed, chunk])
         seeds = (encoder_seed(self.config.seed, chunk, number) for number in range(2**32))
-        watcher = _Watcher(self._env, self._camera_names, rng)
+        randomised = chunk % _RANDOMISED == _RANDOMISED - 1
+        env, sessions = self._randomised if randomised else self._plain
+        watcher = _Watcher(env, self.config.session.camera_names, rng)
         for seed in (next(seeds) for _ in range(_EPISODES)):
-            session = self._sessions[rng.integers(len(self._sessions))]
+            session = sessions[rng.integers(len(sessions))]
             replace(session, observers=(watcher,)).run(seed)
         own = len(watcher.rows)
         while len(watcher.rows) < 2 * own:
-            self._env.reset(seed=next(seeds))
+            env.reset(seed=next(seeds))
             watcher.take(START)
-            for _ in range(_POSES - 1):
-                self._env.simulation.show(watcher.been[rng.integers(len(watcher.been))])
-                watcher.take(ELSEWHERE)
-        return {name: np.stack([row[name] for row in watcher.rows]) for name in watcher.rows[0]}
+            for number in range(_POSES - 1):
+                q = watcher.been[rng.integers(len(watcher.been))]
+                env.simulation.show(watcher.moved(q, _ASTRAY) if number % 2 else q)
+                watcher.take(OTHER)
+        samples = {name: np.stack([row[name] for row in watcher.rows]) for name in watcher.rows[0]}
+        if randomised:
+            samples["kind"][:] = OTHER
+        return samples
 
     def __len__(self) -> int:
         return 2**31
@@ -67,28 +77,28 @@ class Drawn:
     @cached_property
     def reads(self) -> Reads:
         """What an encoder of these reads and says."""
-        env, features = self._env, session_features(self._env)
+        env, _ = self._plain
+        features = session_features(env)
         interface = PolicyInterface.of_dataset(features, (), "realised")
         env.reset(seed=0)
         turns = {item.name: item.turns for item in env.start.scene.objects if item.turns > 1}
         movable = tuple(item.name for item in env.start.scene.objects if item.movable)
-        cameras = dict.fromkeys(self._camera_names, env.image_size)
-        return Reads(self.config.robot, self.config.task, cameras, interface, turns, movable)
-
-    @property
-    def _camera_names(self) -> tuple[str, ...]:
-        return self.config.session.camera_names
+        cameras = dict.fromkeys(self.config.session.camera_names, env.image_size)
+        return Reads(env.model.description.name, self.config.task, cameras, interface, turns, movable)
 
     @cached_property
-    def _env(self) -> HandrailEnv:
-        """It draws only the moments that are asked for."""
-        config = replace(self.config.session, cameras="")
-        return build_env(config, FPS, render=True)
+    def _plain(self) -> tuple[HandrailEnv, list[Session]]:
+        return self._built(randomise=False)
 
     @cached_property
-    def _sessions(self) -> list[Session]:
-        modes = [mode for mode in _DRIVEN if mode in MODES]
-        return [build_session(replace(self.config.session, mode=mode), self._env) for mode in modes]
+    def _randomised(self) -> tuple[HandrailEnv, list[Session]]:
+        return self._built(randomise=True)
+
+    def _built(self, randomise: bool) -> tuple[HandrailEnv, list[Session]]:
+        """Return an environment that draws only the moments that are asked for, and its sessions."""
+        config = replace(self.config.session, cameras="", randomise=randomise)
+        env = build_env(config, FPS, render=True)
+        return env, [build_session(replace(config, mode=mode), env) for mode in _DRIVEN if mode in MODES]
 
 
 class _Watcher:
@@ -118,8 +128,8 @@ class _Watcher:
             self.take(DRIVEN)
         elif number < _OWN + _MOVED and not simulation.held():
             before = simulation.checkpoint()
-            simulation.show(self._moved(q))
-            self.take(MOVED)
+            simulation.show(self.moved(q, _NEAR))
+            self.take(OTHER)
             simulation.restore(before)
 
     def take(self, kind: int) -> None:
@@ -131,9 +141,16 @@ class _Watcher:
         numbers = {"state": state, "environment": around, "kind": np.array(kind)}
         self.rows.append(env.pictures(self._cameras) | numbers)
 
-    def _moved(self, q: FloatArray) -> FloatArray:
+    def moved(self, q: FloatArray, far: float) -> FloatArray:
+        """Return positions of the joints near others, (n,), inside the limits.
+
+        Args:
+            q: the others, (n,).
+            far: standard deviation [m · scale/2, rad]; of the arm's joints `_NEAR`.
+        """
         description = self._env.model.description
-        away = np.full(len(q), _AWAY)
+        away = np.full(len(q), _NEAR)
+        away[:3] = far
         away[:2] *= 0.5 * description.world.scale
         limits = description.limits
         moved = q + away * self._rng.normal(size=len(q))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from dataclasses import asdict
 from typing import Any
 
@@ -18,10 +19,10 @@ from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.encoder.samples import DRIVEN, START, Drawn, Samples, batches
+from handrail.policies.imitation.interface.compute import device_of, threads
 from handrail.policies.imitation.interface.encoder import Encoder, same
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.relative import POSE, rotations
-from handrail.policies.imitation.interface.trained import threads
 
 _KEPT = 1e9  # of samples to draw from [byte]
 _WARMUP = 200  # updates
@@ -98,7 +99,7 @@ class _Training:
         drawn = Drawn(config)
         torch.manual_seed(config.seed)
         self._encoder = Encoder(drawn.reads)
-        network = self._encoder.network
+        network = self._encoder.network.to(device_of(config.device))
         self._averaged = AveragedModel(network, multi_avg_fn=get_ema_multi_avg_fn(_AVERAGED))
         self._optimizer = torch.optim.AdamW(network.parameters(), config.lr, weight_decay=1e-4, fused=True)
         self._draft = config.file.with_suffix(".training")
@@ -116,7 +117,8 @@ class _Training:
     @property
     def encoder(self) -> Encoder:
         """The encoder with the weights' average of lately."""
-        return Encoder(self._encoder.reads, self._averaged.module)  # pyright: ignore[reportArgumentType]
+        network: Any = deepcopy(self._averaged.module)
+        return Encoder(self._encoder.reads, network.cpu())
 
     def updates(self) -> Iterator[int]:
         """Make every update that is left, and yield its number."""
@@ -157,20 +159,20 @@ class _Training:
 
     def _load(self) -> None:
         try:
-            content = torch.load(self._draft, weights_only=True)
+            content = torch.load(self._draft, self._config.device, weights_only=True)
+            same_settings = content["settings"] == self._settings
+            parts = self._encoder.network, self._averaged, self._optimizer
+            for part, state in zip(parts, content["parts"] if same_settings else (), strict=same_settings):
+                part.load_state_dict(state)
+            self._update, self._chunk = content["at"]
         except Exception as error:  # of PyTorch: whatever the file holds, it is refused
             raise HandrailError(f"{str(self._draft)!r}: {message_of(error)}; say --overwrite") from error
-        if content["settings"] != self._settings:
+        if not same_settings:
             raise HandrailError(f"{str(self._draft)!r}: was begun with other settings; say --overwrite")
-        for part, state in zip(
-            (self._encoder.network, self._averaged, self._optimizer), content["parts"], strict=True
-        ):
-            part.load_state_dict(state)
-        self._update, self._chunk = content["at"]
 
     @property
     def _settings(self) -> dict[str, Any]:
-        free = ("output", "updates", "workers", "threads", "overwrite")
+        free = ("output", "updates", "device", "workers", "threads", "overwrite")
         return {name: value for name, value in asdict(self._config).items() if name not in free}
 
 
@@ -182,14 +184,15 @@ def _chunks(config: EncoderConfig, first: int, end: int) -> Iterator[Samples]:
         batch_size=None,
         sampler=range(first, end),
         num_workers=config.workers,
-        collate_fn=_as_they_are,  # pyright: ignore[reportArgumentType]
+        collate_fn=_shared,  # pyright: ignore[reportArgumentType]
         **(around if config.workers else {}),
     )
-    return iter(loader)
+    return ({name: each.numpy() for name, each in chunk.items()} for chunk in loader)
 
 
-def _as_they_are(samples: Samples) -> Samples:
-    return samples
+def _shared(samples: Samples) -> dict[str, Tensor]:
+    """Return samples that go from one process to another without a copy."""
+    return {name: torch.from_numpy(each) for name, each in samples.items()}
 
 
 def _rate(update: int, updates: int) -> float:
@@ -200,10 +203,11 @@ def _rate(update: int, updates: int) -> float:
 
 def _loss(encoder: Encoder, batch: Samples, rng: np.random.Generator) -> Tensor:
     """Return `Σ ‖e‖ / b + 3 log b` over the objects, of their places and turns, a mean over the batch."""
-    pictures = {name: _disturbed(batch[name], rng) for name in encoder.reads.cameras}
+    device = encoder.network.mean.device
+    pictures = {name: _disturbed(batch[name], rng, device) for name in encoder.reads.cameras}
     interface = encoder.reads.interface
     state = batch["state"]
-    numbers = encoder.network(pictures, torch.from_numpy(interface.observe_robot(state)))
+    numbers = encoder.network(pictures, torch.from_numpy(interface.observe_robot(state)).to(device)).cpu()
     loss, start = numbers.new_zeros(()), 0
     for name, parts, first in encoder.reads.objects:
         truth = batch["environment"][:, first : first + len(parts)].astype(float)
@@ -237,10 +241,12 @@ def _surprise(off: Tensor, width: Tensor) -> Tensor:
     return ((off / width.exp() + 3.0 * width) * width.detach().exp().sqrt()).mean()
 
 
-def _disturbed(pictures: np.ndarray, rng: np.random.Generator) -> Tensor:
+def _disturbed(pictures: np.ndarray, rng: np.random.Generator, device: torch.device) -> Tensor:
     """Return pictures from 0 to 1, (B, 3, height, width), shifted a little, brighter or darker."""
     most, shape = round(_SHIFT * pictures.shape[1]), (len(pictures), 1, 1, 1)
     gain, lift = rng.uniform(0.8, 1.2, shape) / 255.0, rng.uniform(-0.1, 0.1, shape)
-    shifted = torch.roll(torch.from_numpy(pictures), rng.integers(-most, most + 1, 2).tolist(), (1, 2))
+    given = torch.from_numpy(pictures).to(device)
+    shifted = torch.roll(given, rng.integers(-most, most + 1, 2).tolist(), (1, 2))
     numbers = shifted.movedim(-1, 1).to(torch.float32, memory_format=torch.contiguous_format)
-    return numbers.mul_(torch.from_numpy(gain).float()).add_(torch.from_numpy(lift).float()).clamp_(0, 1)
+    gains, lifts = (torch.from_numpy(each).float().to(device) for each in (gain, lift))
+    return numbers.mul_(gains).add_(lifts).clamp_(0, 1)

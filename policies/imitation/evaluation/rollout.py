@@ -32,9 +32,10 @@ from handrail.policies.imitation.evaluation.conditions import (
     mode_action,
     own_protection,
 )
+from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
-from handrail.policies.imitation.interface.trained import TrainedPolicy, repeatable, threads
+from handrail.policies.imitation.interface.trained import TrainedPolicy, repeatable
 
 Load = Callable[[Path], TrainedPolicy]
 Row = dict[str, Any]

@@ -41,7 +41,8 @@ class Eye(nn.Module):
 
     def forward(self, pictures: Tensor) -> Tensor:
         """Return what there is and where, (B, 4 k), in pictures from −1 to 1, (B, 3, height, width)."""
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.training and _HALVES):
+        kind = pictures.device.type
+        with torch.autocast(kind, torch.bfloat16, enabled=self.training and (_HALVES or kind == "cuda")):
             found = self.look(pictures)
         found = found.float()  # places are finer than bfloat16
         weights = (self.sharpness * found.flatten(2)).softmax(-1)

@@ -5,6 +5,7 @@
     x ← x + K (y − x),  P ← (1 − K) P
 
 What is far from what is known counts only when it is said again and again: P grows meanwhile, until it fits.
+NaN and infinity never count.
 """
 
 from collections.abc import Mapping
@@ -64,16 +65,24 @@ class _Known:
     def take(self, said: Said, moment: int) -> FloatArray:
         """Take what is said at a moment; return position, and quaternion if it has one, (3,) or (7,)."""
         away = said.position[moment] - self._place
-        self._place = self._place + self._sure.share(float(np.linalg.norm(away)), said.off[moment]) * away
+        if share := self._sure.share(float(np.linalg.norm(away)), said.off[moment]):
+            self._place = self._place + share * away
         if said.rotation is None or said.turned_off is None:
             return self._place
+        if not np.isfinite(said.rotation[moment]).all():
+            return self._pose
         ways = said.rotation[moment] @ self._same
         nearest = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]
         turn = Rotation.from_matrix(nearest @ self._turn.T).as_rotvec()
         share = self._turn_sure.share(float(np.linalg.norm(turn)), said.turned_off[moment])
         now = Rotation.from_rotvec(share * turn) * Rotation.from_matrix(self._turn)
         self._turn = now.as_matrix()
-        return np.append(self._place, now.as_quat(canonical=True, scalar_first=True))
+        return self._pose
+
+    @property
+    def _pose(self) -> FloatArray:
+        quaternion = Rotation.from_matrix(self._turn).as_quat(canonical=True, scalar_first=True)
+        return np.append(self._place, quaternion)
 
 
 class _Variance:
@@ -94,6 +103,8 @@ class _Variance:
             off: b.
         """
         self._variance += self._drift**2
+        if not np.isfinite(away + off):
+            return 0.0
         if np.isinf(self._variance):
             self._variance = off**2
             return 1.0

@@ -98,17 +98,6 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
 
 
 @contextmanager
-def threads(count: int) -> Iterator[None]:
-    """Let PyTorch use so many threads: processes share the cores."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-@contextmanager
 def repeatable(seed: int) -> Iterator[None]:
     """Let what a policy draws depend on the seed alone; what others draw is as before."""
     with torch.random.fork_rng(devices=[]):

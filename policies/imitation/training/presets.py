@@ -59,23 +59,14 @@ def resolved(config: TrainConfig) -> TrainingSizes:
     )
 
 
-def device_of(config: TrainConfig) -> str:
-    """Return where to train."""
-    import torch
-
-    device = config.device or ("cuda" if config.preset == "gpu" else "cpu")
-    available = {"cpu": True, "cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
-    if not available.get(device.partition(":")[0], False):
-        raise unknown_name("device", device, [name for name, here in available.items() if here])
-    return device
-
-
 def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     """Return LeRobot's configuration of the policy: preset, then `lr`, then `policy_options`.
 
     The environment's state is normalised like the robot's, nothing is downloaded, nothing is sent anywhere.
     """
     import draccus
+
+    from handrail.policies.imitation.interface.compute import device_of
 
     choices, sizes = registered_policies(), resolved(config)
     if config.policy not in choices:
@@ -86,7 +77,8 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     for key in sizes.options:
         if key not in known:
             raise unknown_name(f"setting of the policy {config.policy}", key, known)
-    wanted = {"pretrained_backbone_weights": None, "push_to_hub": False, "device": device_of(config)}
+    device = device_of(config.device or ("cuda" if config.preset == "gpu" else "cpu"))
+    wanted = {"pretrained_backbone_weights": None, "push_to_hub": False, "device": device}
     wanted |= {"optimizer_lr": sizes.lr, "optimizer_lr_backbone": sizes.lr} if sizes.lr else {}
     settings = {key: value for key, value in wanted.items() if key in known} | dict(sizes.options)
     try:

@@ -25,7 +25,7 @@ from handrail.policies.imitation.interface.checkpoint import (
     origin_of,
     read_meta,
 )
-from handrail.policies.imitation.interface.trained import threads
+from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
 from handrail.policies.imitation.training.plateau import Plateau
