@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import secrets
 from collections.abc import Iterator, Mapping
 from io import BytesIO
 from itertools import islice
@@ -63,6 +64,8 @@ def _pictures(info: DatasetInfo, row: Mapping[str, Any], camera: str) -> Iterato
 
 
 def _write(path: Path, values: FloatArray) -> None:
-    file = BytesIO()
+    """Write an array; another training may write the same one now."""
+    file, own = BytesIO(), path.with_name(f"{secrets.token_hex(8)}.npy")
     np.save(file, values)
-    write_whole(path, file.getvalue())
+    write_whole(own, file.getvalue())
+    own.replace(path)

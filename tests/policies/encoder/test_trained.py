@@ -15,7 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import open_dataset
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.encoder.config import EncoderConfig
-from handrail.policies.imitation.encoder.samples import DRIVEN, ELSEWHERE, START, Drawn, batches
+from handrail.policies.imitation.encoder.samples import DRIVEN, OTHER, START, Drawn, batches
 from handrail.policies.imitation.encoder.training import train
 from handrail.policies.imitation.evaluation.conditions import read_checkpoint
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -42,7 +42,7 @@ def test_a_chunk_comes_from_its_number_alone(tmp_path):
     one, same = first[1], again[1]
     for name, values in one.items():
         np.testing.assert_array_equal(values, same[name])
-    assert {START, DRIVEN, ELSEWHERE} <= set(one["kind"])
+    assert {START, DRIVEN, OTHER} <= set(one["kind"])
     assert one["front"].shape == (len(one["kind"]), SIZE, SIZE, 3)
     assert not np.array_equal(one["environment"][0], Drawn(config(tmp_path, seed=1))[1]["environment"][0])
 
@@ -50,11 +50,20 @@ def test_a_chunk_comes_from_its_number_alone(tmp_path):
 def test_where_the_robot_is_says_nothing_of_a_scene_elsewhere(tmp_path):
     """Its samples show robots of other episodes: the same scene from several of their poses."""
     chunk = Drawn(config(tmp_path))[0]
-    elsewhere = chunk["kind"] == ELSEWHERE
+    driven = set(map(bytes, chunk["environment"][chunk["kind"] == DRIVEN]))
+    elsewhere = np.array([bytes(scene) not in driven for scene in chunk["environment"]])
+    elsewhere &= chunk["kind"] == OTHER
     scenes, poses = chunk["environment"][elsewhere], chunk["state"][elsewhere]
-    assert len(np.unique(scenes, axis=0)) < len(np.unique(poses, axis=0))
-    driven = chunk["environment"][chunk["kind"] == DRIVEN]
-    assert not set(map(bytes, scenes)) & set(map(bytes, driven))
+    assert 1 < len(np.unique(scenes, axis=0)) < len(np.unique(poses, axis=0))
+
+
+def test_every_fourth_chunk_has_other_light_and_is_not_measured(tmp_path):
+    """Colours of its pictures change from scene to scene, and none counts as what a policy sees."""
+    drawn = Drawn(config(tmp_path))
+    plain, randomised = drawn[2], drawn[3]
+    assert set(randomised["kind"]) == {OTHER}
+    corners = [{bytes(picture[0, 0]) for picture in chunk["front"]} for chunk in (plain, randomised)]
+    assert len(corners[0]) < len(corners[1])
 
 
 def test_batches_come_as_often_as_is_said():
