@@ -3,7 +3,8 @@
 They are drawn, never stored. Of a chunk,
 
 - some are moments of episodes that a script drives, in several teleop modes: also with the cube in hand,
-- some the same moments with the robot moved a little, so that it is not always on its way,
+- some the same moments with the robot moved, a little or much: so that it is not always on its way, and near
+  things with its hand turned otherwise,
 - some are scenes of other episodes, seen by the robot where it was in these: so that where the hand is says
   nothing about where things are,
 - some of these with the robot astray, so that it knows how little it sees there.
@@ -33,9 +34,9 @@ from handrail.policies.imitation.interface.interface import PolicyInterface
 FPS = 20
 _DRIVEN = ("ee", "direct")  # modes of the scripts
 _EPISODES = 3  # of a chunk
-_OWN, _MOVED = 0.08, 0.04  # share of an episode's frames
+_OWN, _MOVED = 0.06, 0.10  # share of an episode's frames
 _POSES = 5  # at which a scene is seen
-_NEAR, _ASTRAY = 0.1, 0.5  # standard deviation by which the robot is moved [m · scale/2, rad]
+_FARTHEST = 0.5  # standard deviation by which the robot is moved at most [m · scale/2, rad]
 _RANDOMISED = 4  # every so-many-th chunk
 Samples = dict[str, np.ndarray]
 START, DRIVEN, OTHER = range(3)
@@ -64,7 +65,7 @@ class Drawn:
             watcher.take(START)
             for number in range(_POSES - 1):
                 q = watcher.been[rng.integers(len(watcher.been))]
-                env.simulation.show(watcher.moved(q, _ASTRAY) if number % 2 else q)
+                env.simulation.show(watcher.moved(q) if number % 2 else q)
                 watcher.take(OTHER)
         samples = {name: np.stack([row[name] for row in watcher.rows]) for name in watcher.rows[0]}
         if randomised:
@@ -128,7 +129,7 @@ class _Watcher:
             self.take(DRIVEN)
         elif number < _OWN + _MOVED and not simulation.held():
             before = simulation.checkpoint()
-            simulation.show(self.moved(q, _NEAR))
+            simulation.show(self.moved(q))
             self.take(OTHER)
             simulation.restore(before)
 
@@ -141,16 +142,10 @@ class _Watcher:
         numbers = {"state": state, "environment": around, "kind": np.array(kind)}
         self.rows.append(env.pictures(self._cameras) | numbers)
 
-    def moved(self, q: FloatArray, far: float) -> FloatArray:
-        """Return positions of the joints near others, (n,), inside the limits.
-
-        Args:
-            q: the others, (n,).
-            far: standard deviation [m · scale/2, rad]; of the arm's joints `_NEAR`.
-        """
+    def moved(self, q: FloatArray) -> FloatArray:
+        """Return positions of the joints near others or far from them, (n,), inside the limits."""
         description = self._env.model.description
-        away = np.full(len(q), _NEAR)
-        away[:3] = far
+        away = np.full(len(q), self._rng.uniform(0.0, _FARTHEST))
         away[:2] *= 0.5 * description.world.scale
         limits = description.limits
         moved = q + away * self._rng.normal(size=len(q))
@@ -173,12 +168,16 @@ def batches(chunks: Iterator[Samples], size: int, reuse: float, most: int, seed:
         kept.append(chunk)
         while sum(map(_count, kept)) - _count(kept[0]) >= most:
             kept.popleft()
-        places = [(each, row) for each in kept for row in range(_count(each))]
+        ends = np.cumsum([_count(each) for each in kept])
         rng = np.random.default_rng([seed, number])
         owed += reuse * _count(chunk) / size
         while owed >= 1.0:
             owed -= 1.0
-            chosen = [places[place] for place in rng.integers(len(places), size=size)]
+            places = rng.integers(ends[-1], size=size)
+            chosen = [
+                (kept[which], place - ends[which])
+                for which, place in zip(np.searchsorted(ends, places, "right"), places, strict=True)
+            ]
             yield {name: np.stack([each[name][row] for each, row in chosen]) for name in chunk}
 
 

@@ -37,8 +37,8 @@ class EvaluateConfig(ExecutionConfig):
     """What stands between policy and robot, one or more: own (an intent's own controller; none for joint
     velocities), none, mpc, filter."""
     perturbation: Names = "none"
-    """What disturbs, one or more: none, push, shift, delay, camera, blank, swap, with a size such as push:2 or
-    delay:5, joined by + to have several at once."""
+    """What disturbs, one or more: none, push, shift, delay, camera, blank, swap, with a size such as push:2
+    or delay:5, joined by + to have several at once."""
     label: Advanced[str] = ""
     """Name of the condition; the teleop mode, and what is special about it, when empty."""
     task: Advanced[Annotated[str, one_of(TASKS)]] = ""

@@ -2,8 +2,8 @@
 
 Of every object whose pose or position the environment's state has, the network says in the base's axes
 
-    d = R_wbᵀ (p_o − p_t)    where it is from the tool [m], (3,)      b     how far that is off [m]
-    M = R_wbᵀ R_o            how it is turned, two columns, (6,)      b_r   how far that is off
+    d = R_wbᵀ (p_o − p_t)    where it is from the tool [m], (3,)      log b     3 b: how far that is off [m]
+    M = R_wbᵀ R_o            how it is turned, two columns, (6,)      log b_r   how far that is off, alike
 
 Other numbers of the environment's state, such as obstacles on the floor, stay zero: nothing is there.
 """
@@ -33,7 +33,7 @@ from handrail.policies.imitation.interface.network import Network
 from handrail.policies.imitation.interface.relative import POSE, POSITION, RobotPose
 
 _SMOOTH = 40.0  # of a saliency: a picture's height over the standard deviation
-_FINEST = 2e-3  # b and b_r are at least that [m, 1]
+_FINEST = 5e-3  # how far something is off at least [m, 1]
 _SAID = {POSITION: 4, POSE: 11}  # numbers that the network says: d, b; and M, b_r
 OWN = Path(__file__).parents[1] / "encoder" / "weights"
 FORMAT = "handrail.encoder/1"
@@ -208,8 +208,11 @@ def same(turns: int) -> FloatArray:
 
 
 def widths(numbers: FloatArray) -> FloatArray:
-    """Return how far something is off, `b = e^s`, of what the network says."""
-    return np.maximum(np.exp(np.clip(numbers, -8.0, 3.0)), _FINEST)
+    """Return how far something is off, `3 b`, `b = e^s`, of what the network says.
+
+    That is the mean of ‖e‖ where e has the density `∝ e^(−‖e‖ / b)`, as in training.
+    """
+    return np.maximum(3.0 * np.exp(np.clip(numbers, -8.0, 3.0)), _FINEST)
 
 
 def orthonormal(columns: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """What was said before is remembered, in the world's axes: a Kalman filter of an object that stands or moves.
 
     P ← P + q                          while time passes: q is small for what stands
-    K = P / (P + b²)                   b: how far what is said now is off
+    K = P / (P + r²)                   r: how far what is said now is off
     x ← x + K (y − x),  P ← (1 − K) P
 
 What is far from what is known counts only when it is said again and again: P grows meanwhile, until it fits.
@@ -16,10 +16,10 @@ from scipy.spatial.transform import Rotation
 from handrail.controllers.arrays import FloatArray
 from handrail.policies.imitation.interface.encoder import Reads, Said, same
 
-_STANDS, _MOVES = (0.005, 0.02), (0.02, 0.10)  # √q, a frame: of the place [m], of the turn
+_STANDS, _MOVES = (0.0005, 0.002), (0.02, 0.10)  # √q, a frame: of the place [m], of the turn
 _FAR = 4.0  # standard deviations
 _DOUBT = 1.2  # by which P grows where what is said is farther
-VERSION = 2  # of all this: what was kept of another one is not read again
+VERSION = 3  # of all this: what was kept of another one is not read again
 
 
 class SceneMemory:
@@ -100,7 +100,7 @@ class _Variance:
 
         Args:
             away: how far it is from what is known.
-            off: b.
+            off: r.
         """
         self._variance += self._drift**2
         if not np.isfinite(away + off):

@@ -19,10 +19,11 @@ from handrail.datasets.reading.digest import digest_of_pictures, video_of
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.atomic import write_whole
+from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.scene_memory import VERSION, SceneMemory
 
-_AT_ONCE = 64  # moments
+_AT_ONCE = 4  # moments: what a core has near it; more takes twice as long
 _FOLDER = "encoded"
 
 
@@ -43,7 +44,8 @@ def encoded(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encod
     name = digest_of_pictures(info, [row]) + hashlib.sha256(states.tobytes()).hexdigest()[:16]
     path = folder / f"{encoder.digest}-{VERSION}" / f"{name}.npy"
     if not path.is_file():
-        _write(path, _said(info, row, states, encoder))
+        with threads(1):  # a few pictures are too little to share
+            _write(path, _said(info, row, states, encoder))
     return np.load(path, allow_pickle=False)
 
 
