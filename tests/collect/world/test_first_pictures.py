@@ -1,12 +1,12 @@
 """What is to be done can be read from the first pictures, so no script steers to what no camera has shown."""
 
-import mujoco
 import numpy as np
 import pytest
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env
 from handrail.collect.world.geometry import VISIBLE_GROUP
+from handrail.collect.world.gl import mujoco
 
 pytestmark = pytest.mark.needs_gl
 SEEDS = 8
