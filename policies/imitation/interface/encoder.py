@@ -30,7 +30,7 @@ from handrail.controllers.typed import Count, Name, decoded
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.network import Network
-from handrail.policies.imitation.interface.relative import POSE, POSITION, RobotPose
+from handrail.policies.imitation.interface.relative import POSE, POSITION
 
 _SMOOTH = 40.0  # of a saliency: a picture's height over the standard deviation
 _FINEST = 5e-3  # how far something is off at least [m, 1]
@@ -73,6 +73,8 @@ class Said:
     """(T, 3) [m]."""
     off: FloatArray
     """How far that is off, (T,) [m]."""
+    away: FloatArray
+    """How far it is from the tool, (T,) [m]."""
     rotation: FloatArray | None = None
     """(T, 3, 3); None of an object that has none."""
     turned_off: FloatArray | None = None
@@ -132,15 +134,18 @@ class Encoder:
         return hashlib.sha256(self._bytes).hexdigest()[:16]
 
     def look(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor], states: FloatArray) -> dict[str, Said]:
-        """Return what the pictures of T moments say, by object.
+        """Return what the pictures of T moments say, by object; arguments as of `read`."""
+        return self.said(self.read(pictures, states), states)
+
+    def read(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor], states: FloatArray) -> FloatArray:
+        """Return the network's numbers, (T, n) float32.
 
         Args:
-            pictures: by camera, of 0 to 255, (T, height, width, 3); or of 0 to 1, (T, 3, height, width).
+            pictures: by camera: 0 to 255, (T, height, width, 3); or 0 to 1, (T, 3, height, width).
             states: of the robot, as recorded, (T, s).
         """
         with torch.inference_mode():
-            numbers = self.network(self._tensors(pictures), self._seen(states))
-        return self.said(numbers.double().numpy(), self.reads.interface.pose(states))
+            return self.network(self._tensors(pictures), self._seen(states)).numpy()
 
     def saliency(self, pictures: Mapping[str, NDArray[np.uint8]], state: FloatArray) -> dict[str, FloatArray]:
         """Return how much each pixel matters to what is said, by camera, (height, width), 0 to 1.
@@ -179,16 +184,16 @@ class Encoder:
             tensors[name] = given
         return tensors
 
-    def said(self, numbers: FloatArray, pose: RobotPose) -> dict[str, Said]:
-        """Return what the network's numbers (T, …) say, by object."""
+    def said(self, numbers: FloatArray, states: FloatArray) -> dict[str, Said]:
+        """Return what the network's numbers, (T, n), say, by object; `states` as of `read`."""
+        numbers, pose = numbers.astype(float), self.reads.interface.pose(states)
         found, start = dict[str, Said](), 0
         for name, parts, _ in self.reads.objects:
             d, b, m, r = np.split(numbers[:, start : start + _SAID[parts]], [3, 4, 10], axis=1)
             start += _SAID[parts]
-            place = pose.tool + pose.turned_back(d)
-            found[name] = Said(place, widths(b[:, 0]))
-            if parts == POSE:
-                found[name] = Said(place, widths(b[:, 0]), pose.matrices @ orthonormal(m), widths(r[:, 0]))
+            said = pose.tool + pose.turned_back(d), widths(b[:, 0]), np.linalg.norm(d, axis=1)
+            turned = (pose.matrices @ orthonormal(m), widths(r[:, 0])) if parts == POSE else ()
+            found[name] = Said(*said, *turned)
         return found
 
 

@@ -1,6 +1,6 @@
 """What was said before is remembered, in the world's axes: a Kalman filter of an object that stands or moves.
 
-    P ← P + q                          while time passes: q is small for what stands
+    P ← P + q                          a frame later; q is small for what stands, or is out of reach
     K = P / (P + r²)                   r: how far what is said now is off
     x ← x + K (y − x),  P ← (1 − K) P
 
@@ -17,9 +17,9 @@ from handrail.controllers.arrays import FloatArray
 from handrail.policies.imitation.interface.encoder import Reads, Said, same
 
 _STANDS, _MOVES = (0.0005, 0.002), (0.02, 0.10)  # √q, a frame: of the place [m], of the turn
+_REACH = 0.2  # from the tool, beside how far off that is [m]
 _FAR = 4.0  # standard deviations
 _DOUBT = 1.2  # by which P grows where what is said is farther
-VERSION = 3  # of all this: what was kept of another one is not read again
 
 
 class SceneMemory:
@@ -59,13 +59,15 @@ class _Known:
     def __init__(self, turns: int, movable: bool) -> None:
         self._same = same(turns)
         self._place, self._turn = np.zeros(3), np.eye(3)
-        place, turn = _MOVES if movable else _STANDS
-        self._sure, self._turn_sure = _Variance(place), _Variance(turn)
+        self._movable = movable
+        self._sure, self._turn_sure = _Variance(), _Variance()
 
     def take(self, said: Said, moment: int) -> FloatArray:
         """Take what is said at a moment; return position, and quaternion if it has one, (3,) or (7,)."""
+        moves = self._movable and said.away[moment] < _REACH + said.off[moment]
+        drift, turn_drift = _MOVES if moves else _STANDS
         away = said.position[moment] - self._place
-        if share := self._sure.share(float(np.linalg.norm(away)), said.off[moment]):
+        if share := self._sure.share(float(np.linalg.norm(away)), said.off[moment], drift):
             self._place = self._place + share * away
         if said.rotation is None or said.turned_off is None:
             return self._place
@@ -74,7 +76,7 @@ class _Known:
         ways = said.rotation[moment] @ self._same
         nearest = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]
         turn = Rotation.from_matrix(nearest @ self._turn.T).as_rotvec()
-        share = self._turn_sure.share(float(np.linalg.norm(turn)), said.turned_off[moment])
+        share = self._turn_sure.share(float(np.linalg.norm(turn)), said.turned_off[moment], turn_drift)
         now = Rotation.from_rotvec(share * turn) * Rotation.from_matrix(self._turn)
         self._turn = now.as_matrix()
         return self._pose
@@ -86,23 +88,20 @@ class _Known:
 
 
 class _Variance:
-    """P: how far off what is known is, squared.
+    """P: how far off what is known is, squared."""
 
-    Args:
-        drift: √q.
-    """
+    def __init__(self) -> None:
+        self._variance = np.inf
 
-    def __init__(self, drift: float) -> None:
-        self._drift, self._variance = drift, np.inf
-
-    def share(self, away: float, off: float) -> float:
+    def share(self, away: float, off: float, drift: float) -> float:
         """Return K for what is said; 0 where it is too far away to be believed.
 
         Args:
             away: how far it is from what is known.
             off: r.
+            drift: √q.
         """
-        self._variance += self._drift**2
+        self._variance += drift**2
         if not np.isfinite(away + off):
             return 0.0
         if np.isinf(self._variance):

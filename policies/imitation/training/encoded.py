@@ -1,4 +1,4 @@
-"""What an encoder says of recorded pictures, computed once and kept in the user's cache folder."""
+"""What an encoder says of recorded pictures; what its network says is kept in the user's cache folder."""
 
 import hashlib
 import os
@@ -21,7 +21,7 @@ from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.encoder import Encoder
-from handrail.policies.imitation.interface.scene_memory import VERSION, SceneMemory
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
 
 _AT_ONCE = 4  # moments: what a core has near it; more takes twice as long
 _FOLDER = "encoded"
@@ -42,22 +42,21 @@ def encoded(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encod
         raise HandrailError(f"dataset {str(info.root)!r}: {words}; handrail-edit render draws them")
     folder = Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser() / "handrail" / _FOLDER
     name = digest_of_pictures(info, [row]) + hashlib.sha256(states.tobytes()).hexdigest()[:16]
-    path = folder / f"{encoder.digest}-{VERSION}" / f"{name}.npy"
+    path = folder / encoder.digest / f"{name}.npy"
     if not path.is_file():
         with threads(1):  # a few pictures are too little to share
-            _write(path, _said(info, row, states, encoder))
-    return np.load(path, allow_pickle=False)
+            _write(path, _read(info, row, states, encoder))
+    said, memory = encoder.said(np.load(path, allow_pickle=False), states), SceneMemory(encoder.reads)
+    return np.stack([memory.take(said, moment) for moment in range(len(states))])
 
 
-def _said(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encoder: Encoder) -> FloatArray:
-    memory, rows = SceneMemory(encoder.reads), list[FloatArray]()
-    videos = {name: _pictures(info, row, PICTURE + name) for name in encoder.reads.cameras}
+def _read(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encoder: Encoder) -> FloatArray:
+    videos, numbers = {name: _pictures(info, row, PICTURE + name) for name in encoder.reads.cameras}, []
     for start in range(0, len(states), _AT_ONCE):
         part = states[start : start + _AT_ONCE]
         shown = {name: np.stack(list(islice(video, len(part)))) for name, video in videos.items()}
-        said = encoder.look(shown, part)
-        rows += [memory.take(said, moment) for moment in range(len(part))]
-    return np.stack(rows)
+        numbers.append(encoder.read(shown, part))
+    return np.concatenate(numbers)
 
 
 def _pictures(info: DatasetInfo, row: Mapping[str, Any], camera: str) -> Iterator[NDArray[np.uint8]]:

@@ -22,7 +22,8 @@ SIZE = (32, 48)
 def reads(task="pick_place"):
     env = build_env(SessionConfig(task=task), 20)
     interface = PolicyInterface.of_dataset(session_features(env), (), "realised")
-    return Reads("ridgeback_ur10", task, {"front": SIZE, "wrist": SIZE}, interface, {"cube": 4})
+    front_wrist = {"front": SIZE, "wrist": SIZE}
+    return Reads("ridgeback_ur10", task, front_wrist, interface, {"cube": 4}, ("cube",))
 
 
 def encoder(seed=0):
@@ -102,9 +103,10 @@ def test_a_file_of_something_else_is_refused(tmp_path):
         find_encoder(str(path))
 
 
-def said(place, off=0.1, turn=None, turned_off=0.1):
+def said(place, off=0.1, turn=None, turned_off=0.1, away=0.1):
     rotation = None if turn is None else np.asarray(turn)[None]
-    return Said(np.array([place], float), np.array([off]), rotation, np.array([turned_off]))
+    place, off, away, turned_off = (np.array([each], float) for each in (place, off, away, turned_off))
+    return Said(place, off, away, rotation, turned_off)
 
 
 def remembered(memory, of_cube):
@@ -118,6 +120,18 @@ def test_what_is_said_again_and_again_becomes_surer():
         now = remembered(memory, said([1.0, 2.0, 0.5] + rng.normal(0, 0.05, 3), 0.1, np.eye(3)))
     assert np.linalg.norm(now[:3] - [1.0, 2.0, 0.5]) < 0.04
     np.testing.assert_allclose(now[3:], [1.0, 0.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_what_the_hand_does_not_reach_stands():
+    """In the hand a cube is where it is seen now; elsewhere where it was seen on average."""
+    held, elsewhere = SceneMemory(reads()), SceneMemory(reads())
+    for x in np.linspace(0.0, 1.0, 50):
+        in_hand = remembered(held, said([x, 0.0, 0.0], 0.02, np.eye(3), away=0.05))
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        stands = remembered(elsewhere, said(rng.normal(0, 0.05, 3), 0.08, np.eye(3), away=1.0))
+    assert abs(in_hand[0] - 1.0) < 0.03
+    assert np.linalg.norm(stands[:3]) < 0.025
 
 
 def test_what_is_surer_counts_more():
