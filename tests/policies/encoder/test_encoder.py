@@ -10,6 +10,7 @@ from safetensors.torch import save_file
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, session_features
 from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.interface.compute import device_of
 from handrail.policies.imitation.interface.encoder import Encoder, Reads, Said, find_encoder, same
 from handrail.policies.imitation.interface.encoder_step import encoder_step
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
@@ -162,6 +163,22 @@ def test_what_is_unsure_hardly_moves_what_is_known():
     for _ in range(20):
         known = memory.take(lost, 0)
     assert abs(known[7] - 1.0) < 0.05  # the bin
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_nan_is_never_remembered(bad):
+    """Neither as the first word nor later."""
+    memory, broken = SceneMemory(reads()), said([bad] * 3, 0.01, np.full((3, 3), bad), bad)
+    assert np.isfinite(remembered(memory, broken)).all()
+    first = remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
+    np.testing.assert_allclose(first[:3], [1.0, 0.0, 0.0])
+    np.testing.assert_array_equal(remembered(memory, broken), first)
+
+
+def test_an_unknown_device_is_refused():
+    assert device_of("cpu") == "cpu"
+    with pytest.raises(HandrailError, match="unknown device 'tpu': expected one of cpu"):
+        device_of("tpu")
 
 
 def test_a_quarter_turn_of_a_cube_is_no_turn():

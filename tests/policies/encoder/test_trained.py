@@ -166,3 +166,10 @@ def test_saliency_is_where_the_thing_is():
     heat = blind.saliency(pictures, state)["front"]
     assert np.unravel_index(heat.argmax(), heat.shape) == (5, 40)
     assert heat.max() == pytest.approx(1.0)
+
+
+def test_a_draft_of_something_else_is_refused(tmp_path):
+    settings = config(tmp_path)
+    torch.save({"a": 1}, settings.file.with_suffix(".training"))
+    with pytest.raises(HandrailError, match="say --overwrite"):
+        train(settings)
