@@ -33,11 +33,11 @@ class EncoderConfig:
     """Cameras of the robot that it reads."""
     image_size: int | str = 224
     """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
-    updates: AtLeastOne = 8000
+    updates: AtLeastOne = 4000
     """Of the network."""
-    batch_size: Advanced[AtLeastOne] = 48
+    batch_size: Advanced[AtLeastOne] = 32
     """Samples an update."""
-    reuse: Advanced[Annotated[float, Meta(gt=0, le=100)]] = 1.5
+    reuse: Advanced[Annotated[float, Meta(gt=0, le=100)]] = 3.0
     """How often a sample is learnt from, on average."""
     lr: Advanced[Annotated[float, Meta(gt=0, le=1)]] = 1e-3
     """Highest learning rate."""

@@ -5,8 +5,7 @@ They are drawn, never stored. Of a chunk,
 - some are moments of episodes that a script drives, in several teleop modes: also with the cube in hand,
 - some the same moments with the robot moved, a little or much: so that it is not always on its way, and near
   things with its hand turned otherwise,
-- some are scenes of other episodes, seen by the robot where it was in these: so that where the hand is says
-  nothing about where things are,
+- some are scenes of other episodes, seen by the robot where it was in these, for these cost no driving,
 - some of these with the robot astray, so that it knows how little it sees there.
 
 A part of the chunks has other light, colours and camera poses each time.
@@ -30,6 +29,7 @@ from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.interface.encoder import Reads
 from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.views import CameraMount
 
 FPS = 20
 _DRIVEN = ("ee", "direct")  # modes of the scripts
@@ -50,7 +50,10 @@ class Drawn:
     config: EncoderConfig
 
     def __getitem__(self, chunk: int) -> Samples:
-        """Return a chunk: pictures by camera, `state`, `environment`, `kind`; (N, …) each."""
+        """Return a chunk: pictures by camera, `views`, `state`, `environment`, `kind`; (N, …) each.
+
+        `views` is where each camera is, and the slope of its field of view: c, R, s, (cameras, 13).
+        """
         rng = np.random.default_rng([self.config.seed, chunk])
         seeds = (encoder_seed(self.config.seed, chunk, number) for number in range(2**32))
         randomised = chunk % _RANDOMISED == _RANDOMISED - 1
@@ -84,7 +87,11 @@ class Drawn:
         env.reset(seed=0)
         turns = {item.name: item.turns for item in env.start.scene.objects if item.turns > 1}
         movable = tuple(item.name for item in env.start.scene.objects if item.movable)
-        cameras = dict.fromkeys(self.config.session.camera_names, env.image_size)
+        cameras = {
+            each.name: CameraMount.of(each, env.model, env.image_size)
+            for each in env.model.description.cameras
+            if each.name in self.config.session.camera_names
+        }
         return Reads(env.model.description.name, self.config.task, cameras, interface, turns, movable)
 
     @cached_property
@@ -139,7 +146,9 @@ class _Watcher:
         truth = env.task_state()
         state = self._agent.read(env.state(), truth.tool, truth.opening)
         around = np.asarray(env.task.features(truth), np.float32)
-        numbers = {"state": state, "environment": around, "kind": np.array(kind)}
+        cameras = map(env.simulation.camera, self._cameras)
+        views = [(*at.position, *at.rotation.ravel(), np.tan(np.deg2rad(fovy) / 2)) for at, fovy in cameras]
+        numbers = {"state": state, "environment": around, "kind": np.array(kind), "views": np.array(views)}
         self.rows.append(env.pictures(self._cameras) | numbers)
 
     def moved(self, q: FloatArray) -> FloatArray:

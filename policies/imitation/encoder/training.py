@@ -21,8 +21,9 @@ from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.encoder.samples import DRIVEN, START, Drawn, Samples, batches
 from handrail.policies.imitation.interface.compute import device_of, threads
 from handrail.policies.imitation.interface.encoder import Encoder, same
-from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.relative import POSE, rotations
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
+from handrail.policies.imitation.interface.views import PLACED, in_picture, placed
 
 _KEPT = 1e9  # of samples to draw from [byte]
 _WARMUP = 200  # updates
@@ -31,7 +32,7 @@ _AVERAGED = 0.998  # of the weights, an update
 _MEASURED = 2**31  # number of the first chunk that is only measured on
 _CHUNKS = 4
 _SAVED = 200  # updates
-_SHIFT = 0.02  # of a picture's height: by so much it is shifted at most
+_LOOK = 0.3  # how much it counts where an eye looks
 
 
 def train(config: EncoderConfig) -> None:
@@ -60,20 +61,29 @@ def errors(encoder: Encoder, chunks: Iterator[Samples]) -> dict[str, dict[str, F
     """
     found: dict[str, dict[str, list[FloatArray]]] = {}
     for chunk in chunks:
-        said = encoder.look({name: chunk[name] for name in encoder.reads.cameras}, chunk["state"])
+        told = _without_memory(encoder, chunk)
         for name, parts, start in encoder.reads.objects:
-            truth = chunk["environment"][:, start : start + len(parts)].astype(float)
-            off = {"position": np.linalg.norm(said[name].position - truth[:, :3], axis=1)}
-            if (turned := said[name].rotation) is not None:
+            truth, said = (each[:, start : start + len(parts)] for each in (chunk["environment"], told))
+            off = {"position": np.linalg.norm(said[:, :3] - truth[:, :3], axis=1)}
+            if parts == POSE:
                 apart = same(encoder.reads.turns.get(name, 1))
                 ways = np.einsum("tij,kjl->ktil", rotations(truth[:, 3:]), apart)
-                trace = np.einsum("ktij,tij->kt", ways, turned).max(0)
+                trace = np.einsum("ktij,tij->kt", ways, rotations(said[:, 3:])).max(0)
                 off["rotation"] = np.degrees(np.arccos(np.clip((trace - 1) / 2, -1, 1)))
             for moment, kind in (("start", START), ("under way", DRIVEN)):
                 for what, values in off.items():
                     rows = found.setdefault(name, {}).setdefault(f"{what} {moment}", [])
                     rows.append(values[chunk["kind"] == kind])
     return {name: {what: np.concatenate(each) for what, each in of.items()} for name, of in found.items()}
+
+
+def _without_memory(encoder: Encoder, chunk: Samples) -> FloatArray:
+    """Return the environment's state as each moment alone says it, (T, e)."""
+    pictures = (
+        {name: chunk[name][[row]] for name in encoder.reads.cameras} for row in range(len(chunk["kind"]))
+    )
+    said = encoder.said(np.concatenate([encoder.read(each) for each in pictures]), chunk["state"])
+    return np.stack([SceneMemory(encoder.reads).take(said, row) for row in range(len(chunk["kind"]))])
 
 
 def error_table(found: Mapping[str, Mapping[str, FloatArray]]) -> Table:
@@ -108,11 +118,6 @@ class _Training:
             self._draft.unlink(missing_ok=True)
         if self._draft.is_file():
             self._load()
-        else:
-            chunk = drawn[_MEASURED - 1]
-            seen = drawn.reads.interface.observe_robot(chunk["state"])
-            network.mean.copy_(torch.from_numpy(seen.mean(0)))
-            network.spread.copy_(torch.from_numpy(np.maximum(seen.std(0), 1e-2)))
 
     @property
     def encoder(self) -> Encoder:
@@ -123,7 +128,7 @@ class _Training:
     def updates(self) -> Iterator[int]:
         """Make every update that is left, and yield its number."""
         config, network = self._config, self._encoder.network
-        size = sum(3 * h * w for h, w in self._encoder.reads.cameras.values())
+        size = sum(3 * h * w for h, w in self._encoder.reads.pictures.values())
         drawn = self._counted(_chunks(config, self._chunk, 2**30))
         samples = batches(drawn, config.batch_size, config.reuse, round(_KEPT / size), config.seed)
         rng = np.random.default_rng([config.seed, self._chunk, 1])
@@ -202,51 +207,64 @@ def _rate(update: int, updates: int) -> float:
 
 
 def _loss(encoder: Encoder, batch: Samples, rng: np.random.Generator) -> Tensor:
-    """Return `Σ ‖e‖ / b + 3 log b` over the objects, of their places and turns, a mean over the batch."""
-    device = encoder.network.mean.device
+    """Return −log p of where the objects are and how they are turned, the mean over a batch.
+
+    Summed over cameras and objects; `p ∝ e^(−m)` with `m² = e_l² / σ_l² + e_d² / σ_d²`, `m = ‖e_M‖ / b`;
+    and `p = w`, what an eye looks at, of where they are in a picture.
+    """
+    device = next(encoder.network.parameters()).device
     pictures = {name: _disturbed(batch[name], rng, device) for name in encoder.reads.cameras}
-    interface = encoder.reads.interface
-    state = batch["state"]
-    numbers = encoder.network(pictures, torch.from_numpy(interface.observe_robot(state)).to(device)).cpu()
-    loss, start = numbers.new_zeros(()), 0
-    for name, parts, first in encoder.reads.objects:
-        truth = batch["environment"][:, first : first + len(parts)].astype(float)
-        place, ways = _targets(interface, state, truth, parts, encoder.reads.turns.get(name, 1))
-        d, b = numbers[:, start : start + 3], numbers[:, start + 3]
-        start += 4
-        loss = loss + _surprise((d - place).norm(dim=1), b)
-        if ways is not None:
-            m, r = numbers[:, start : start + 6], numbers[:, start + 6]
-            start += 7
-            loss = loss + _surprise((m[None] - ways).norm(dim=2).amin(0), r)
+    looked, loss = encoder.network.look(pictures), torch.zeros(())
+    views = zip(encoder.reads.cameras.values(), looked, batch["views"].swapaxes(0, 1), strict=True)
+    for camera, (said, heat), view in views:
+        turn, slope = view[:, 3:12].reshape(-1, 3, 3), torch.from_numpy(view[:, 12]).float()
+        parts = said.cpu().split(encoder.reads.sizes, 1), heat.cpu().unbind(1)
+        for (name, quantities, first), each, warm in zip(encoder.reads.objects, *parts, strict=True):
+            truth = batch["environment"][:, first : first + len(quantities)].astype(float)
+            place, ray, width = placed(each, slope, camera.size)
+            there = torch.from_numpy(np.einsum("tji,tj->ti", turn, truth[:, :3] - view[:, :3])).float()
+            loss = loss + _LOOK * _missed(warm, in_picture(there, slope, camera.size))
+            off = place - there
+            along = (off * ray).sum(1)
+            across = (off - along[:, None] * ray).norm(dim=1)
+            far = torch.stack([across, along], 1) / width.exp()
+            loss = loss + _surprise(far.norm(dim=1), width @ torch.tensor([2.0, 1.0]))
+            if quantities == POSE:
+                ways = _ways(turn.swapaxes(1, 2) @ rotations(truth[:, 3:]), encoder.reads.turns.get(name, 1))
+                b = each[:, -1].clamp(-6.0, 3.0)
+                loss = loss + _surprise((each[:, PLACED:-1] - ways).norm(dim=2).amin(0) / b.exp(), 3.0 * b)
     return loss
 
 
-def _targets(
-    interface: PolicyInterface, state: FloatArray, truth: FloatArray, parts: tuple[str, ...], turns: int
-) -> tuple[Tensor, Tensor | None]:
-    """Return what shall be said of an object: d, (T, 3), and M in all ways that look the same, (k, T, 6)."""
-    pose = interface.pose(state)
-    place = torch.from_numpy(pose.turned(truth[:, :3] - pose.tool)).float()
-    if parts != POSE:
-        return place, None
-    turned = pose.matrices.transpose(0, 2, 1) @ rotations(truth[:, 3:])
+def _missed(warm: Tensor, place: Tensor) -> Tensor:
+    """Return −log w at places of pictures, the mean over a batch; 0 where they are beside.
+
+    Args:
+        warm: log w, (T, h, w).
+        place: u, v, (T, 2).
+    """
+    inside = (place.abs() <= 1.0).all(1)
+    at = torch.where(inside[:, None], place, 0.0)[:, None, None]
+    found = nn.functional.grid_sample(warm[:, None], at, align_corners=True)
+    return -(found.flatten() * inside).mean()
+
+
+def _ways(turned: FloatArray, turns: int) -> Tensor:
+    """Return M in all ways that look the same, (k, T, 6)."""
     ways = np.einsum("tij,kjl->ktil", turned, same(turns))[..., :2]
-    return place, torch.from_numpy(ways.swapaxes(2, 3).reshape(*ways.shape[:2], 6)).float()
+    return torch.from_numpy(ways.swapaxes(2, 3).reshape(*ways.shape[:2], 6)).float()
 
 
-def _surprise(off: Tensor, width: Tensor) -> Tensor:
-    """Return the mean of `‖e‖ / b + 3 log b`, `b = e^width`; what is known badly counts less, by √b."""
-    width = width.clamp(-6.0, 3.0)
-    return ((off / width.exp() + 3.0 * width) * width.detach().exp().sqrt()).mean()
+def _surprise(far: Tensor, volume: Tensor) -> Tensor:
+    """Return the mean of `m + log σ³`; what is known badly counts less, by √σ."""
+    return ((far + volume) * (volume.detach() / 6.0).exp()).mean()
 
 
 def _disturbed(pictures: np.ndarray, rng: np.random.Generator, device: torch.device) -> Tensor:
-    """Return pictures from 0 to 1, (B, 3, height, width), shifted a little, brighter or darker."""
-    most, shape = round(_SHIFT * pictures.shape[1]), (len(pictures), 1, 1, 1)
+    """Return pictures from 0 to 1, (B, 3, height, width), brighter or darker."""
+    shape = (len(pictures), 1, 1, 1)
     gain, lift = rng.uniform(0.8, 1.2, shape) / 255.0, rng.uniform(-0.1, 0.1, shape)
     given = torch.from_numpy(pictures).to(device)
-    shifted = torch.roll(given, rng.integers(-most, most + 1, 2).tolist(), (1, 2))
-    numbers = shifted.movedim(-1, 1).to(torch.float32, memory_format=torch.contiguous_format)
+    numbers = given.movedim(-1, 1).to(torch.float32, memory_format=torch.contiguous_format)
     gains, lifts = (torch.from_numpy(each).float().to(device) for each in (gain, lift))
     return numbers.mul_(gains).add_(lifts).clamp_(0, 1)

@@ -121,7 +121,7 @@ def _looked(encoder: Encoder | None, frame: Frame) -> list[np.ndarray]:
     """Return what the cameras see; red is where a change would change most what an encoder says."""
     if encoder is None:
         return list(frame.images.values())
-    heat = encoder.saliency(frame.images, frame.state)
+    heat = encoder.saliency(frame.images)
     shown: list[np.ndarray] = []
     for name, warm in heat.items():
         grey = frame.images[name].mean(axis=2, keepdims=True) * (1.0 - warm[..., None])

@@ -1,11 +1,12 @@
 """An encoder: pictures and the robot's state become `observation.environment_state`, which nobody tells then.
 
-Of every object whose pose or position the environment's state has, the network says in the base's axes
+Of every object whose pose or position the environment's state has, each camera says
 
-    d = R_wbᵀ (p_o − p_t)    where it is from the tool [m], (3,)      log b     3 b: how far that is off [m]
-    M = R_wbᵀ R_o            how it is turned, two columns, (6,)      log b_r   how far that is off, alike
+    u, v, log ρ        where it is in the picture, how far away        log σ_l, log σ_d   (`views.py`)
+    M = Rᵀ R_o         how it is turned, two columns, (6,)             log b   3 b: how far that is off
 
-Other numbers of the environment's state, such as obstacles on the floor, stay zero: nothing is there.
+from its picture alone; where the camera is (c, R) follows from the robot's state. Other numbers of the
+environment's state, such as obstacles on the floor, stay zero: nothing is there.
 """
 
 import hashlib
@@ -31,12 +32,13 @@ from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.network import Network
 from handrail.policies.imitation.interface.relative import POSE, POSITION
+from handrail.policies.imitation.interface.views import PLACED, CameraMount, placed, spread
 
 _SMOOTH = 40.0  # of a saliency: a picture's height over the standard deviation
-_FINEST = 5e-3  # how far something is off at least [m, 1]
-_SAID = {POSITION: 4, POSE: 11}  # numbers that the network says: d, b; and M, b_r
+_FINEST = 5e-3  # how far something is turned off at least
+_SAID = {POSITION: PLACED, POSE: PLACED + 7}  # numbers that the network says of an object
 OWN = Path(__file__).parents[1] / "encoder" / "weights"
-FORMAT = "handrail.encoder/1"
+FORMAT = "handrail.encoder/2"
 
 
 @dataclass(frozen=True)
@@ -45,10 +47,9 @@ class Reads:
 
     robot: Name
     task: Name
-    cameras: Mapping[Name, tuple[Count, Count]]
-    """Height and width of the pictures [px], by camera."""
+    cameras: Mapping[Name, CameraMount]
     interface: PolicyInterface
-    """Names of the recorded numbers, and the robot's state as policies read it."""
+    """Names of the recorded numbers."""
     turns: Mapping[Name, Count]
     """Objects that look the same after so many-th of a turn around their z axis."""
     movable: tuple[Name, ...] = ()
@@ -60,21 +61,26 @@ class Reads:
         return tuple(each for each in self.interface.objects if each[1] in _SAID)
 
     @property
-    def size(self) -> int:
-        """How many numbers the network says."""
-        return sum(_SAID[parts] for _, parts, _ in self.objects)
+    def pictures(self) -> dict[Name, tuple[Count, Count]]:
+        """Height and width of the pictures [px], by camera."""
+        return {name: camera.size for name, camera in self.cameras.items()}
+
+    @property
+    def sizes(self) -> list[int]:
+        """How many numbers the network says of each object."""
+        return [_SAID[parts] for _, parts, _ in self.objects]
 
 
 @dataclass(frozen=True)
 class Said:
-    """What is said of one object at T moments, in the world's axes."""
+    """What a camera says of one object at T moments, in the world's axes."""
 
+    tool: FloatArray
+    """Where the tool is, (T, 3) [m]."""
     position: FloatArray
     """(T, 3) [m]."""
-    off: FloatArray
-    """How far that is off, (T,) [m]."""
-    away: FloatArray
-    """How far it is from the tool, (T,) [m]."""
+    spread: FloatArray
+    """Σ, (T, 3, 3) [m²]."""
     rotation: FloatArray | None = None
     """(T, 3, 3); None of an object that has none."""
     turned_off: FloatArray | None = None
@@ -90,10 +96,9 @@ class Encoder:
     """
 
     def __init__(self, reads: Reads, network: Network | None = None) -> None:
-        state, _ = reads.interface.observation_names
-        heights = {name: height for name, (height, _) in reads.cameras.items()}
+        heights = {name: camera.size[0] for name, camera in reads.cameras.items()}
         self.reads = reads
-        self.network = network or Network(heights, len(state), reads.size)
+        self.network = network or Network(heights, reads.sizes)
         self.network.eval()
 
     @classmethod
@@ -133,48 +138,47 @@ class Encoder:
         """What tells it apart from others."""
         return hashlib.sha256(self._bytes).hexdigest()[:16]
 
-    def look(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor], states: FloatArray) -> dict[str, Said]:
-        """Return what the pictures of T moments say, by object; arguments as of `read`."""
-        return self.said(self.read(pictures, states), states)
+    def look(
+        self, pictures: Mapping[str, NDArray[np.uint8] | Tensor], states: FloatArray
+    ) -> dict[str, list[Said]]:
+        """Return what the pictures of T moments say, by object, of each camera; see `read` and `said`."""
+        return self.said(self.read(pictures), states)
 
-    def read(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor], states: FloatArray) -> FloatArray:
-        """Return the network's numbers, (T, n) float32.
+    def read(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor]) -> FloatArray:
+        """Return the network's numbers, (T, cameras, n) float32.
 
         Args:
             pictures: by camera: 0 to 255, (T, height, width, 3); or 0 to 1, (T, 3, height, width).
-            states: of the robot, as recorded, (T, s).
         """
         with torch.inference_mode():
-            return self.network(self._tensors(pictures), self._seen(states)).numpy()
+            return self.network(self._tensors(pictures)).numpy()
 
-    def saliency(self, pictures: Mapping[str, NDArray[np.uint8]], state: FloatArray) -> dict[str, FloatArray]:
+    def saliency(self, pictures: Mapping[str, NDArray[np.uint8]]) -> dict[str, FloatArray]:
         """Return how much each pixel matters to what is said, by camera, (height, width), 0 to 1.
 
-        That is `‖∂d/∂pixel‖`, smoothed; d of all objects.
+        That is `‖∂(u, v, log ρ) / ∂pixel‖ / σ_l`, smoothed, of all objects.
 
         Args:
             pictures: of a moment, by camera, (height, width, 3).
-            state: of the robot, as recorded, (s,).
         """
         tensors = self._tensors({name: each[None] for name, each in pictures.items()})
         given = [each.requires_grad_() for each in tensors.values()]
-        numbers = self.network(tensors, self._seen(state[None]))
-        starts = np.cumsum([0, *(_SAID[parts] for _, parts, _ in self.reads.objects)])[:-1]
+        numbers = self.network(tensors)[0].sum(0)
+        starts = np.cumsum([0, *self.reads.sizes[:-1]]).tolist()
         heat = [torch.zeros(each.shape[2:]) for each in given]
-        for number in (numbers[0, start + axis] for start in starts for axis in range(3)):
+        for number in (
+            numbers[start + axis] / numbers[start + 3].detach().exp() for start in starts for axis in range(3)
+        ):
             for total, slope in zip(heat, torch.autograd.grad(number, given, retain_graph=True), strict=True):
                 total += slope[0].square().sum(0)
         smooth = [gaussian_filter(each.sqrt().numpy(), len(each) / _SMOOTH) for each in heat]
         return {name: each / max(each.max(), 1e-12) for name, each in zip(tensors, smooth, strict=True)}
 
-    def _seen(self, states: FloatArray) -> Tensor:
-        return torch.from_numpy(self.reads.interface.observe_robot(states))
-
     def _tensors(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor]) -> dict[str, Tensor]:
         """Return pictures as the network takes them, those of its cameras."""
         tensors = dict[str, Tensor]()
-        for name, size in self.reads.cameras.items():
-            given = pictures.get(name)
+        for name, camera in self.reads.cameras.items():
+            given, size = pictures.get(name), camera.size
             if isinstance(given, np.ndarray):
                 given = torch.from_numpy(np.ascontiguousarray(given)).movedim(-1, 1) / 255.0
             if given is None or tuple(given.shape[1:]) != (3, *size):
@@ -184,16 +188,26 @@ class Encoder:
             tensors[name] = given
         return tensors
 
-    def said(self, numbers: FloatArray, states: FloatArray) -> dict[str, Said]:
-        """Return what the network's numbers, (T, n), say, by object; `states` as of `read`."""
-        numbers, pose = numbers.astype(float), self.reads.interface.pose(states)
-        found, start = dict[str, Said](), 0
-        for name, parts, _ in self.reads.objects:
-            d, b, m, r = np.split(numbers[:, start : start + _SAID[parts]], [3, 4, 10], axis=1)
-            start += _SAID[parts]
-            said = pose.tool + pose.turned_back(d), widths(b[:, 0]), np.linalg.norm(d, axis=1)
-            turned = (pose.matrices @ orthonormal(m), widths(r[:, 0])) if parts == POSE else ()
-            found[name] = Said(*said, *turned)
+    def said(self, numbers: FloatArray, states: FloatArray) -> dict[str, list[Said]]:
+        """Return what the network's numbers, (T, cameras, n), say, by object, of each camera.
+
+        Args:
+            numbers: of `read`.
+            states: of the robot, as recorded, (T, s).
+        """
+        pose, found = self.reads.interface.pose(states), {name: [] for name, _, _ in self.reads.objects}
+        for camera, said in zip(
+            self.reads.cameras.values(), np.moveaxis(numbers.astype(float), 1, 0), strict=True
+        ):
+            place, turn = camera.view(pose)
+            slope = torch.full((len(said),), camera.slope, dtype=torch.float64)
+            parts = np.split(said, np.cumsum(self.reads.sizes)[:-1], axis=1)
+            for (name, _, _), each in zip(self.reads.objects, parts, strict=True):
+                d, ray, width = (of.numpy() for of in placed(torch.from_numpy(each), slope, camera.size))
+                position, rays = (np.einsum("tij,tj->ti", turn, of) for of in (d, ray))
+                m, r = each[:, PLACED:-1], each[:, -1]
+                turned = (turn @ orthonormal(m), widths(r)) if m.size else ()
+                found[name].append(Said(pose.tool, place + position, spread(rays, width), *turned))
         return found
 
 

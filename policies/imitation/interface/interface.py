@@ -111,17 +111,12 @@ class PolicyInterface:
         if state.ndim == 1:
             numbers = self.observe(state[None], environment[None])
             return numbers[0][0], numbers[1][0]
-        environment, pose = np.asarray(environment, float), self.pose(state)
+        state, environment, pose = np.asarray(state, float), np.asarray(environment, float), self.pose(state)
+        own = [self._of(state, self._own), pose.tool_seen, *([pose.base_seen] if self._shows_base else [])]
         around: list[FloatArray] = [np.zeros((len(state), 0))]
         for _, parts, start in self.objects:
             around.append(seen(parts, environment[:, start : start + len(parts)], pose))
-        return self.observe_robot(state), np.column_stack(around).astype(np.float32)
-
-    def observe_robot(self, state: FloatArray) -> FloatArray:
-        """Return what the policy reads of the robot itself, (T, s') float32, of recorded states, (T, s)."""
-        state, pose = np.asarray(state, float), self.pose(state)
-        own = [self._of(state, self._own), pose.tool_seen, *([pose.base_seen] if self._shows_base else [])]
-        return np.column_stack(own).astype(np.float32)
+        return np.column_stack(own).astype(np.float32), np.column_stack(around).astype(np.float32)
 
     def encode(self, columns: Columns) -> FloatArray:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""

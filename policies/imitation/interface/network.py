@@ -1,13 +1,14 @@
-"""The network that says from pictures where things are: an eye for each camera; beside it the robot's state.
+"""The network that says from a picture where things are: an eye for each camera, which knows of no robot.
 
-    f = convolutions of a picture                      (k, h, w), group norm; its size is halved twice or more
-    u_j = Σ softmax(t f_j) (x, y)                      where the j-th feature is, (k, 2): a spatial softmax
-    y = MLP(u, max f, mean f of every eye; state)
+    f = convolutions of a picture, near and around                 (k, h, w), group norm
+    u_o = Σ w_o (x, y),  g_o = Σ w_o f,  w_o = softmax(heat_o)     where the o-th thing is, and how it looks
+    y = u, MLP(u, g of all things, max f, mean f)                  what is said: `encoder.py`
 
 Spatial softmax: Finn et al., Deep spatial autoencoders for visuomotor learning, ICRA 2016.
+Dilated convolutions: Yu & Koltun, Multi-scale context aggregation by dilated convolutions, ICLR 2016.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -16,6 +17,7 @@ _FEATURES = 32  # k, of an eye
 _HIDDEN = 256
 _SMALL = 160  # pictures up to this height are halved once less [px]
 _LARGE = 300  # from this height on an eye has half the channels [px]
+_SPREAD = (1, 2, 4)  # of the taps of convolutions, one after the other
 _HALVES = bool(getattr(torch.cpu, "get_capabilities", dict)().get("amx_bf16"))  # half the time
 
 
@@ -24,68 +26,71 @@ class Eye(nn.Module):
 
     Args:
         height: of its pictures [px].
+        sizes: how many numbers it says of each thing; where it is in the picture first.
     """
 
-    def __init__(self, height: int) -> None:
+    def __init__(self, height: int, sizes: Sequence[int]) -> None:
         super().__init__()
         width = 16 if height > _LARGE else 32
         stem = (5, 2, 2) if height <= _SMALL else (7, 4, 3)
-        self.look = nn.Sequential(
-            *_layer(3, width, *stem),
-            *_layer(width, 2 * width, 3, 2, 1),
-            *_layer(2 * width, 2 * width, 3, 1, 1),
-            *_layer(2 * width, 2 * width, 3, 1, 1),
-            nn.Conv2d(2 * width, _FEATURES, 1),
+        wide = [_layer(2 * width, 2 * width, 3, 1, by, by) for by in _SPREAD]
+        self.near = nn.Sequential(*_layer(3, width, *stem), *_layer(width, 2 * width, 3, 2, 1))
+        self.around = nn.Sequential(
+            *_layer(2 * width, 2 * width, 3, 2, 1), *(part for layer in wide for part in layer)
         )
-        self.sharpness = nn.Parameter(torch.ones(1))
-
-    def forward(self, pictures: Tensor) -> Tensor:
-        """Return what there is and where, (B, 4 k), in pictures from −1 to 1, (B, 3, height, width)."""
-        kind = pictures.device.type
-        with torch.autocast(kind, torch.bfloat16, enabled=self.training and (_HALVES or kind == "cuda")):
-            found = self.look(pictures)
-        found = found.float()  # places are finer than bfloat16
-        weights = (self.sharpness * found.flatten(2)).softmax(-1)
-        rows, columns = (torch.linspace(-1.0, 1.0, size, device=found.device) for size in found.shape[2:])
-        grid = torch.stack(torch.meshgrid(columns, rows, indexing="xy"), -1).flatten(0, 1)
-        return torch.cat([(weights @ grid).flatten(1), found.amax((2, 3)), found.mean((2, 3))], 1)
-
-
-class Network(nn.Module):
-    """Reads pictures of some cameras, and the robot's state.
-
-    Args:
-        heights: of the pictures, by camera [px].
-        state: size of the robot's state.
-        out: how many numbers it says.
-    """
-
-    mean: Tensor
-    spread: Tensor
-
-    def __init__(self, heights: Mapping[str, int], state: int, out: int) -> None:
-        super().__init__()
-        self.eyes = nn.ModuleDict({name: Eye(height) for name, height in heights.items()})
+        self.both = nn.Sequential(*_layer(4 * width, _FEATURES, 1, 1, 0))
+        self.heat = nn.Conv2d(_FEATURES, len(sizes), 1)
         self.say = nn.Sequential(
-            nn.Linear(4 * _FEATURES * len(heights) + state, _HIDDEN),
+            nn.Linear(len(sizes) * (_FEATURES + 2) + 2 * _FEATURES, _HIDDEN),
             nn.ReLU(),
             nn.Linear(_HIDDEN, _HIDDEN),
             nn.ReLU(),
-            nn.Linear(_HIDDEN, out),
+            nn.Linear(_HIDDEN, sum(sizes)),
         )
-        self.register_buffer("mean", torch.zeros(state))
-        self.register_buffer("spread", torch.ones(state))
+        starts = torch.tensor([0, *sizes[:-1]]).cumsum(0)
+        self._places = torch.stack([starts, starts + 1], 1).flatten()
 
-    def forward(self, pictures: Mapping[str, Tensor], state: Tensor) -> Tensor:
-        """Return what it says, (B, out).
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """Return what it says, (B, Σ sizes), and log w, (B, o, h, w), of pictures from −1 to 1, (B, 3, …)."""
+        kind = pictures.device.type
+        with torch.autocast(kind, torch.bfloat16, enabled=self.training and (_HALVES or kind == "cuda")):
+            near = self.near(pictures)
+            around = nn.functional.interpolate(self.around(near), near.shape[2:], mode="bilinear")
+            found = self.both(torch.cat([near, around], 1))
+        found = found.float()  # places are finer than bfloat16
+        heat = self.heat(found).flatten(2).log_softmax(-1)
+        weights = heat.exp()
+        rows, columns = (torch.linspace(-1.0, 1.0, size, device=found.device) for size in found.shape[2:])
+        grid = torch.stack(torch.meshgrid(columns, rows, indexing="xy"), -1).flatten(0, 1)
+        places = (weights @ grid).flatten(1)
+        looks = (weights @ found.flatten(2).transpose(1, 2)).flatten(1)
+        said = self.say(torch.cat([places, looks, found.amax((2, 3)), found.mean((2, 3))], 1))
+        return said.index_copy(1, self._places.to(said.device), places), heat.unflatten(2, found.shape[2:])
 
-        Args:
-            pictures: by camera, (B, 3, height, width), from 0 to 1.
-            state: of the robot, (B, s).
-        """
-        seen = [eye(2.0 * pictures[name] - 1.0) for name, eye in self.eyes.items()]
-        return self.say(torch.cat([*seen, (state - self.mean) / self.spread], 1))
+
+class Network(nn.Module):
+    """Reads pictures of some cameras.
+
+    Args:
+        heights: of the pictures, by camera [px].
+        sizes: how many numbers it says of each thing.
+    """
+
+    def __init__(self, heights: Mapping[str, int], sizes: Sequence[int]) -> None:
+        super().__init__()
+        self.eyes = nn.ModuleDict({name: Eye(height, sizes) for name, height in heights.items()})
+
+    def forward(self, pictures: Mapping[str, Tensor]) -> Tensor:
+        """Return what it says of pictures from 0 to 1, (B, 3, height, width); (B, cameras, Σ sizes)."""
+        return torch.stack([said for said, _ in self.look(pictures)], 1)
+
+    def look(self, pictures: Mapping[str, Tensor]) -> list[tuple[Tensor, Tensor]]:
+        """Return what each eye says of pictures as of `forward`, and log w."""
+        return [eye(2.0 * pictures[name] - 1.0) for name, eye in self.eyes.items()]
 
 
-def _layer(before: int, after: int, size: int, stride: int, padding: int) -> tuple[nn.Module, ...]:
-    return nn.Conv2d(before, after, size, stride, padding), nn.GroupNorm(8, after), nn.ReLU()
+def _layer(
+    before: int, after: int, size: int, stride: int, padding: int, spread: int = 1
+) -> tuple[nn.Module, ...]:
+    convolution = nn.Conv2d(before, after, size, stride, padding, spread)
+    return convolution, nn.GroupNorm(8, after), nn.ReLU()

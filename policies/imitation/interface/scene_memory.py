@@ -1,14 +1,14 @@
-"""What was said before is remembered, in the world's axes: a Kalman filter of an object that stands or moves.
+"""What was said before is remembered, in the world's axes: a Kalman filter of a thing that stands or moves.
 
-    P ← P + q                          a frame later; q is small for what stands, or is out of reach
-    K = P / (P + r²)                   r: how far what is said now is off
+    P ← P + q 1                        a frame later; q is small for what stands, or is out of reach
+    K = P (P + Σ)⁻¹                    Σ: how far what a camera says now is off
     x ← x + K (y − x),  P ← (1 − K) P
 
-What is far from what is known counts only when it is said again and again: P grows meanwhile, until it fits.
-NaN and infinity never count.
+So a place is found from its rays, by several cameras and by one that moves. What is far from what is known
+counts only when it is said again and again: P grows meanwhile, until it fits. NaN and infinity never count.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,6 +20,7 @@ _STANDS, _MOVES = (0.0005, 0.002), (0.02, 0.10)  # √q, a frame: of the place [
 _REACH = 0.2  # from the tool, beside how far off that is [m]
 _FAR = 4.0  # standard deviations
 _DOUBT = 1.2  # by which P grows where what is said is farther
+_ALIKE = 4.0  # frames that say as much as one of what stands: what is off now is off a frame later
 
 
 class SceneMemory:
@@ -40,7 +41,7 @@ class SceneMemory:
             name: _Known(reads.turns.get(name, 1), name in reads.movable) for name, _, _ in reads.objects
         }
 
-    def take(self, said: Mapping[str, Said], moment: int) -> FloatArray:
+    def take(self, said: Mapping[str, Sequence[Said]], moment: int) -> FloatArray:
         """Take what is said at a moment, and return the environment's state as it is known, (e,) float32."""
         numbers = np.zeros(len(self._reads.interface.environment_names), np.float32)
         for name, parts, start in self._reads.objects:
@@ -59,57 +60,56 @@ class _Known:
     def __init__(self, turns: int, movable: bool) -> None:
         self._same = same(turns)
         self._place, self._turn = np.zeros(3), np.eye(3)
+        self._spread: FloatArray | None = None  # P
+        self._turn_variance = np.inf
         self._movable = movable
-        self._sure, self._turn_sure = _Variance(), _Variance()
 
-    def take(self, said: Said, moment: int) -> FloatArray:
-        """Take what is said at a moment; return position, and quaternion if it has one, (3,) or (7,)."""
-        moves = self._movable and said.away[moment] < _REACH + said.off[moment]
-        drift, turn_drift = _MOVES if moves else _STANDS
-        away = said.position[moment] - self._place
-        if share := self._sure.share(float(np.linalg.norm(away)), said.off[moment], drift):
-            self._place = self._place + share * away
-        if said.rotation is None or said.turned_off is None:
+    def take(self, said: Sequence[Said], moment: int) -> FloatArray:
+        """Take what the cameras say at a moment; return position, (3,), or with its quaternion, (7,)."""
+        alike = _ALIKE
+        if self._spread is not None:
+            away = float(np.linalg.norm(self._place - said[0].tool[moment]))
+            moves = self._movable and away < _REACH + np.sqrt(np.trace(self._spread))
+            drift, turn_drift = _MOVES if moves else _STANDS
+            alike = 1.0 if moves else _ALIKE
+            self._spread = self._spread + drift**2 * np.eye(3)
+            self._turn_variance += turn_drift**2
+        for each in said:
+            self._take_place(each.position[moment], each.spread[moment], alike)
+            if each.rotation is not None and each.turned_off is not None:
+                self._take_turn(each.rotation[moment], float(each.turned_off[moment]), alike)
+        if said[0].rotation is None:
             return self._place
-        if not np.isfinite(said.rotation[moment]).all():
-            return self._pose
-        ways = said.rotation[moment] @ self._same
-        nearest = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]
-        turn = Rotation.from_matrix(nearest @ self._turn.T).as_rotvec()
-        share = self._turn_sure.share(float(np.linalg.norm(turn)), said.turned_off[moment], turn_drift)
-        now = Rotation.from_rotvec(share * turn) * Rotation.from_matrix(self._turn)
-        self._turn = now.as_matrix()
-        return self._pose
-
-    @property
-    def _pose(self) -> FloatArray:
         quaternion = Rotation.from_matrix(self._turn).as_quat(canonical=True, scalar_first=True)
         return np.append(self._place, quaternion)
 
+    def _take_place(self, place: FloatArray, spread: FloatArray, alike: float) -> None:
+        if not (np.isfinite(place).all() and np.isfinite(spread).all()):
+            return
+        if self._spread is None:
+            self._place, self._spread = place, spread
+            return
+        away = place - self._place
+        if away @ np.linalg.solve(self._spread + spread, away) > _FAR**2:
+            self._spread = _DOUBT * self._spread
+            return
+        share = np.linalg.solve(self._spread + alike * spread, self._spread).T
+        self._place = self._place + share @ away
+        kept = self._spread - share @ self._spread
+        self._spread = 0.5 * (kept + kept.T)
 
-class _Variance:
-    """P: how far off what is known is, squared."""
-
-    def __init__(self) -> None:
-        self._variance = np.inf
-
-    def share(self, away: float, off: float, drift: float) -> float:
-        """Return K for what is said; 0 where it is too far away to be believed.
-
-        Args:
-            away: how far it is from what is known.
-            off: r.
-            drift: √q.
-        """
-        self._variance += drift**2
-        if not np.isfinite(away + off):
-            return 0.0
-        if np.isinf(self._variance):
-            self._variance = off**2
-            return 1.0
-        if away**2 > _FAR**2 * (self._variance + off**2):
-            self._variance *= _DOUBT
-            return 0.0
-        share = self._variance / (self._variance + off**2)
-        self._variance *= 1.0 - share
-        return float(share)
+    def _take_turn(self, turn: FloatArray, off: float, alike: float) -> None:
+        if not (np.isfinite(turn).all() and np.isfinite(off)):
+            return
+        ways = turn @ self._same
+        nearest = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]
+        if np.isinf(self._turn_variance):
+            self._turn, self._turn_variance = nearest, off**2
+            return
+        away = Rotation.from_matrix(nearest @ self._turn.T).as_rotvec()
+        if away @ away > _FAR**2 * (self._turn_variance + off**2):
+            self._turn_variance *= _DOUBT
+            return
+        share = self._turn_variance / (self._turn_variance + alike * off**2)
+        self._turn = (Rotation.from_rotvec(share * away) * Rotation.from_matrix(self._turn)).as_matrix()
+        self._turn_variance *= 1.0 - share

@@ -28,7 +28,7 @@ from handrail.policies.imitation.interface.interface import (
     STATE,
     PolicyInterface,
 )
-from handrail.policies.imitation.training.encoded import encoded
+from handrail.policies.imitation.training.encoded import encoded, has_pictures, tellable
 from handrail.policies.imitation.training.memory import (
     PICTURES,
     MemoryDataset,
@@ -214,9 +214,13 @@ def _check_fits(encoder: Encoder, interface: PolicyInterface) -> None:
 def _encoded(
     info: DatasetInfo, selection: Selection, encoder: Encoder, episodes: Iterable[Columns]
 ) -> Iterator[Columns]:
-    """Yield episodes with what the encoder says instead of where things are."""
+    """Yield episodes with what the encoder says, or would say if it were never off, of where things are."""
+    seen = has_pictures(info, encoder)
     for row, episode in zip(selection.rows, episodes, strict=True):
-        yield episode | {ENVIRONMENT: encoded(info, row, episode[STATE], encoder)}
+        said = (
+            encoded(info, row, episode[STATE], encoder) if seen else tellable(episode[ENVIRONMENT], encoder)
+        )
+        yield episode | {ENVIRONMENT: said}
 
 
 def _check_one_mode(selection: Selection, said: str) -> None:

@@ -142,7 +142,7 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> Po
         episodes=tuple(int(row["episode_index"]) for row in rows),
         data=source.digest,
         time_limit=_time_limit(rows),
-        cameras=source.encoder.reads.cameras if source.encoder else {},
+        cameras=source.encoder.reads.pictures if source.encoder else {},
         validation={str(step): loss for step, loss in losses.items()},
     )
 

@@ -1,7 +1,5 @@
 """An encoder's laws: what it says comes from pictures, its file is all that it is, its memory fits."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -14,8 +12,9 @@ from handrail.policies.imitation.interface.compute import device_of
 from handrail.policies.imitation.interface.encoder import Encoder, Reads, Said, find_encoder, same
 from handrail.policies.imitation.interface.encoder_step import encoder_step
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
-from handrail.policies.imitation.interface.network import Network
+from handrail.policies.imitation.interface.network import Eye
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
+from handrail.policies.imitation.interface.views import PLACED, CameraMount, in_picture, placed, spread
 
 SIZE = (32, 48)
 
@@ -23,8 +22,8 @@ SIZE = (32, 48)
 def reads(task="pick_place"):
     env = build_env(SessionConfig(task=task), 20)
     interface = PolicyInterface.of_dataset(session_features(env), (), "realised")
-    front_wrist = {"front": SIZE, "wrist": SIZE}
-    return Reads("ridgeback_ur10", task, front_wrist, interface, {"cube": 4}, ("cube",))
+    mounts = {each.name: CameraMount.of(each, env.model, SIZE) for each in env.model.description.cameras}
+    return Reads("ridgeback_ur10", task, mounts, interface, {"cube": 4}, ("cube",))
 
 
 def encoder(seed=0):
@@ -57,8 +56,8 @@ def test_its_file_is_all_that_it_is(tmp_path):
     assert loaded.reads == one.reads
     assert loaded.digest == one.digest != encoder(1).digest
     assert (tmp_path / "a.safetensors").read_bytes() == (tmp_path / "b.safetensors").read_bytes()
-    first, second = one.look(pictures, states), loaded.look(pictures, states)
-    np.testing.assert_allclose(first["cube"].position, second["cube"].position, atol=5e-3)  # float16
+    first, second = (each.look(pictures, states)["cube"][0] for each in (one, loaded))
+    np.testing.assert_allclose(first.position, second.position, atol=5e-3)  # float16
 
 
 def test_what_it_says_moves_with_the_robot():
@@ -68,10 +67,10 @@ def test_what_it_says_moves_with_the_robot():
     elsewhere = states.copy()
     for name, by in (("x.pos", 1.0), ("tool.x", 1.0)):
         elsewhere[:, names.index(name)] += by
-    one.network.spread[:] = 1e9  # the state itself says nothing
-    here, there = one.look(pictures, states)["cube"], one.look(pictures, elsewhere)["cube"]
-    np.testing.assert_allclose(there.position - here.position, [[1.0, 0.0, 0.0]], atol=1e-5)
-    np.testing.assert_allclose(np.array(there.rotation), np.array(here.rotation), atol=1e-6)
+    for here, there in zip(*(one.look(pictures, each)["cube"] for each in (states, elsewhere)), strict=True):
+        np.testing.assert_allclose(there.position - here.position, [[1.0, 0.0, 0.0]], atol=1e-5)
+        np.testing.assert_allclose(there.spread, here.spread)
+        np.testing.assert_allclose(np.array(there.rotation), np.array(here.rotation), atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -98,16 +97,18 @@ def test_a_file_of_something_else_is_refused(tmp_path):
     save_file(one.network.state_dict(), path)
     with pytest.raises(HandrailError, match="expected"):
         find_encoder(str(path))
-    one.network.mean[0] = float("nan")
+    next(one.network.parameters()).data[0] = float("nan")
     one.save(path)
     with pytest.raises(HandrailError, match="expected finite weights"):
         find_encoder(str(path))
 
 
 def said(place, off=0.1, turn=None, turned_off=0.1, away=0.1):
+    """Return what a camera says that is as far off in every direction."""
     rotation = None if turn is None else np.asarray(turn)[None]
-    place, off, away, turned_off = (np.array([each], float) for each in (place, off, away, turned_off))
-    return Said(place, off, away, rotation, turned_off)
+    place, turned_off = np.array([place], float), np.array([turned_off], float)
+    tool = place + [[away, 0.0, 0.0]]
+    return [Said(tool, place, off**2 * np.eye(3)[None], rotation, turned_off)]
 
 
 def remembered(memory, of_cube):
@@ -212,10 +213,56 @@ def test_in_a_checkpoint_it_says_the_same(tmp_path):
     np.testing.assert_array_equal(found[ENVIRONMENT][0], SceneMemory(one.reads).take(told, 0))
 
 
-def test_eyes_of_large_pictures_halve_them_more():
-    """What an eye's spatial softmax says is where the one bright place is."""
-    for size in ((96, 96), (224, 224), (360, 640)):
-        network = Network({"front": size[0]}, 3, 4).eval()
-        found = network({"front": torch.zeros(1, 3, *size)}, torch.zeros(1, 3))
-        assert found.shape == (1, 4)
-    assert dataclasses.is_dataclass(Reads)
+@pytest.mark.parametrize("size", [(96, 96), (224, 224), (360, 640)])
+def test_an_eye_says_where_in_a_picture_something_is(size):
+    """An eye whose heat is brightness says where the one bright place is."""
+    eye = Eye(size[0], [PLACED]).eval()
+
+    class Bright(torch.nn.Module):
+        def forward(self, pictures):
+            bright = torch.nn.functional.avg_pool2d(pictures.mean(1, keepdim=True), 8)
+            return bright.expand(-1, eye.heat.in_channels, -1, -1)
+
+    class Half(torch.nn.Module):
+        def forward(self, found):
+            return found[:, : eye.heat.in_channels]
+
+    eye.near, eye.around, eye.both = Bright(), torch.nn.Identity(), Half()  # pyright: ignore[reportAttributeAccessIssue]
+    torch.nn.init.constant_(eye.heat.weight, 10.0)
+    torch.nn.init.zeros_(eye.say[-1].weight)
+    torch.nn.init.zeros_(eye.say[-1].bias)
+    shown = -torch.ones(1, 3, *size)
+    row, column = round(0.25 * size[0] / 8) * 8, round(0.75 * size[1] / 8) * 8
+    shown[:, :, row : row + 8, column : column + 8] = 1.0
+    said, heat = eye(shown)
+    u, v = said[0, :2].tolist()
+    assert heat.exp().sum((2, 3)).item() == pytest.approx(1.0)
+    assert u == pytest.approx(2.0 * (column + 3.5) / (size[1] - 1) - 1.0, abs=0.1)
+    assert v == pytest.approx(2.0 * (row + 3.5) / (size[0] - 1) - 1.0, abs=0.1)
+
+
+def test_a_place_in_two_pictures_is_a_place_in_space():
+    """Cameras that know no distance find a thing where their rays meet."""
+    mounts = reads().cameras
+    _, states = moments(1)
+    pose = reads().interface.pose(states)
+    thing = pose.tool[0] + [0.3, 0.1, -0.2]
+    seen = []
+    for mount in mounts.values():
+        place, turn = (each[0] for each in mount.view(pose))
+        way = turn.T @ (thing - place)
+        u, v = way[0] / -way[2] / mount.slope / (SIZE[1] / SIZE[0]), way[1] / way[2] / mount.slope
+        numbers = torch.tensor([[u, v, 0.0, np.log(0.002), np.log(1.0)]])
+        d, ray, width = (
+            each.numpy() for each in placed(numbers, torch.tensor([mount.slope], dtype=torch.float64), SIZE)
+        )
+        np.testing.assert_allclose(ray[0], way / np.linalg.norm(way), atol=1e-6)
+        again = in_picture(torch.from_numpy(d), torch.tensor([mount.slope], dtype=torch.float64), SIZE)
+        np.testing.assert_allclose(again[0], [u, v], atol=1e-6)
+        off = spread(ray @ turn.T, width)
+        seen.append(Said(pose.tool, place + d @ turn.T, off, np.eye(3)[None], np.ones(1)))
+    others = {name: said([0.0, 0.0, 0.0]) for name in ("bin", "cube_table", "bin_table")}
+    memory = SceneMemory(reads())
+    for _ in range(5):
+        found = memory.take({"cube": seen} | others, 0)[:3]
+    np.testing.assert_allclose(found, thing, atol=0.01)

@@ -22,6 +22,7 @@ from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import evaluate
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.training.encoded import tellable
 from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train as train_policy
 
@@ -118,6 +119,28 @@ def test_a_policy_learns_what_the_encoder_says(looking):
     assert source.encoder.digest == encoder.digest
 
 
+def test_without_recorded_pictures_it_learns_from_the_truth(looking, tmp_path):
+    """And looks when it drives: the encoder is in the checkpoint all the same."""
+    _, settings, _ = looking
+    record_by_command(tmp_path / "told", "--task reach --mode ee --dataset.num_episodes 2")
+    told = dataclasses.replace(settings, dataset=StoredConfig(root=str(tmp_path / "told")), encoder="")
+    source, plain = read_source(dataclasses.replace(told, encoder=settings.encoder)), read_source(told)
+    np.testing.assert_array_equal(source.columns[ENVIRONMENT], plain.columns[ENVIRONMENT])
+    assert source.encoder is not None
+    record_by_command(tmp_path / "one", f"--task reach --mode ee --cameras wrist --image_size {SIZE}")
+    with pytest.raises(HandrailError, match="found none of front; handrail-edit render"):
+        read_source(dataclasses.replace(settings, dataset=StoredConfig(root=str(tmp_path / "one"))))
+
+
+def test_what_an_encoder_never_says_is_not_learnt():
+    one = Encoder(Drawn(EncoderConfig(task="pick_place", image_size=SIZE)).reads)
+    told = tellable(np.ones((2, len(one.reads.interface.environment_names)), np.float32), one)
+    names = zip(one.reads.interface.environment_names, told[0], strict=True)
+    assert {name.split(".")[0] for name, value in names if value == 0.0} == {
+        *("obstacle_0", "obstacle_1", "obstacle_2")
+    }
+
+
 def test_anybody_can_run_it(looking):
     """LeRobot's own loader brings the encoder along, with its weights."""
     folder, _, place = looking
@@ -128,6 +151,7 @@ def test_anybody_can_run_it(looking):
         state = dataset.frames(0, [STATE])[STATE][:1]
     images = {f"observation.images.{name}": torch.rand(1, 3, SIZE, SIZE) for name in ("front", "wrist")}
     first = before(images | {STATE: torch.from_numpy(state)})
+    before.reset()
     told = before(images | {STATE: torch.from_numpy(state), ENVIRONMENT: torch.full((1, 7), 9.0)})
     assert torch.isfinite(first[ENVIRONMENT]).all()
     torch.testing.assert_close(first[ENVIRONMENT], told[ENVIRONMENT])  # whatever is told
@@ -156,14 +180,12 @@ def test_saliency_is_where_the_thing_is():
     pictures = {name: np.zeros((SIZE, SIZE, 3), np.uint8) for name in ("front", "wrist")}
 
     class Corner(torch.nn.Module):
-        def forward(self, shown, state):
+        def forward(self, shown):
             bright = shown["front"][:, :, 5, 40].sum(1) + 0.0 * shown["wrist"].sum()
-            return bright[:, None] * torch.ones(1, encoder.reads.size)
+            return bright[:, None, None] * torch.ones(1, 2, sum(encoder.reads.sizes))
 
     blind = Encoder(drawn.reads, Corner())
-    state = np.zeros(len(drawn.reads.interface.state_names))
-    state[drawn.reads.interface.state_names.index("tool.qw")] = 1.0
-    heat = blind.saliency(pictures, state)["front"]
+    heat = blind.saliency(pictures)["front"]
     assert np.unravel_index(heat.argmax(), heat.shape) == (5, 40)
     assert heat.max() == pytest.approx(1.0)
 
