@@ -48,6 +48,20 @@ def test_a_chunk_comes_from_its_number_alone(tmp_path):
     assert not np.array_equal(one["environment"][0], Drawn(config(tmp_path, seed=1))[1]["environment"][0])
 
 
+def test_cameras_come_in_the_order_that_is_asked_for(tmp_path):
+    drawn = Drawn(config(tmp_path, cameras="wrist,front"))
+    chunk, reads = drawn[0], drawn.reads
+    assert list(reads.cameras) == ["wrist", "front"]
+    for row, camera in zip(
+        chunk["views"].swapaxes(0, 1)[:, chunk["kind"] == START], reads.cameras.values(), strict=True
+    ):
+        place, turn = camera.view(reads.interface.pose(chunk["state"][chunk["kind"] == START]))
+        np.testing.assert_allclose(row[:, :3], place, atol=1e-5)
+        np.testing.assert_allclose(row[:, 3:12].reshape(-1, 3, 3), turn, atol=1e-5)
+    with pytest.raises(HandrailError, match="unknown camera of the robot 'scene'"):
+        _ = Drawn(config(tmp_path, cameras="front,scene")).reads
+
+
 def test_where_the_robot_is_says_nothing_of_a_scene_elsewhere(tmp_path):
     """Its samples show robots of other episodes: the same scene from several of their poses."""
     chunk = Drawn(config(tmp_path))[0]
