@@ -23,7 +23,7 @@ from handrail.policies.imitation.interface.compute import device_of, threads
 from handrail.policies.imitation.interface.encoder import Encoder, same
 from handrail.policies.imitation.interface.relative import POSE, rotations
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
-from handrail.policies.imitation.interface.views import PLACED, in_picture, placed
+from handrail.policies.imitation.interface.views import PLACED, facing, in_picture, placed
 
 _KEPT = 1e9  # of samples to draw from [byte]
 _WARMUP = 200  # updates
@@ -230,7 +230,8 @@ def _loss(encoder: Encoder, batch: Samples, rng: np.random.Generator) -> Tensor:
             far = torch.stack([across, along], 1) / width.exp()
             loss = loss + _surprise(far.norm(dim=1), width @ torch.tensor([2.0, 1.0]))
             if quantities == POSE:
-                ways = _ways(turn.swapaxes(1, 2) @ rotations(truth[:, 3:]), encoder.reads.turns.get(name, 1))
+                axes = (turn @ facing(there.numpy())).swapaxes(1, 2)
+                ways = _ways(axes @ rotations(truth[:, 3:]), encoder.reads.turns.get(name, 1))
                 b = each[:, -1].clamp(-6.0, 3.0)
                 loss = loss + _surprise((each[:, PLACED:-1] - ways).norm(dim=2).amin(0) / b.exp(), 3.0 * b)
     return loss
@@ -245,7 +246,7 @@ def _missed(warm: Tensor, place: Tensor) -> Tensor:
     """
     inside = (place.abs() <= 1.0).all(1)
     at = torch.where(inside[:, None], place, 0.0)[:, None, None]
-    found = nn.functional.grid_sample(warm[:, None], at, align_corners=True)
+    found = nn.functional.grid_sample(warm[:, None], at, align_corners=False)
     return -(found.flatten() * inside).mean()
 
 

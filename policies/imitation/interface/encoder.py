@@ -32,7 +32,7 @@ from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.network import Network
 from handrail.policies.imitation.interface.relative import POSE, POSITION
-from handrail.policies.imitation.interface.views import PLACED, CameraMount, placed, spread
+from handrail.policies.imitation.interface.views import PLACED, CameraMount, facing, placed, spread
 
 _SMOOTH = 40.0  # of a saliency: a picture's height over the standard deviation
 _FINEST = 5e-3  # how far something is turned off at least
@@ -206,7 +206,7 @@ class Encoder:
                 d, ray, width = (of.numpy() for of in placed(torch.from_numpy(each), slope, camera.size))
                 position, rays = (np.einsum("tij,tj->ti", turn, of) for of in (d, ray))
                 m, r = each[:, PLACED:-1], each[:, -1]
-                turned = (turn @ orthonormal(m), widths(r)) if m.size else ()
+                turned = (turn @ facing(ray) @ orthonormal(m), widths(r)) if m.size else ()
                 found[name].append(Said(pose.tool, place + position, spread(rays, width), *turned))
         return found
 

@@ -82,6 +82,15 @@ def placed(numbers: Tensor, slope: Tensor, size: tuple[int, int]) -> tuple[Tenso
     return numbers[:, 2:3].clamp(-4.0, 3.0).exp() * ray, ray, numbers[:, 3:5].clamp(-7.0, 2.0)
 
 
+def facing(ways: FloatArray) -> FloatArray:
+    """Return the least rotations that turn a camera towards ways in its axes, (T, 3) to (T, 3, 3)."""
+    n = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    x, y, toward = n[:, 0], n[:, 1], np.maximum(1.0 - n[:, 2], 1e-9)
+    side = np.stack([1.0 - x * x / toward, -x * y / toward, x], 1)
+    up = np.stack([-x * y / toward, 1.0 - y * y / toward, y], 1)
+    return np.stack([side, up, -n], 2)
+
+
 def in_picture(place: Tensor, slope: Tensor, size: tuple[int, int]) -> Tensor:
     """Return u, v, (T, 2), of places in a camera's axes, (T, 3); infinity behind it; as of `placed`."""
     depth = torch.where(place[:, 2] < 0.0, -place[:, 2], 0.0) * slope
