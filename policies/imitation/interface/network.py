@@ -78,7 +78,7 @@ class Eye(nn.Module):
         )
         grid = torch.stack(torch.meshgrid(columns, rows, indexing="xy"), -1).flatten(0, 1)
         at = weights @ grid
-        near = self.closely(_windows(pictures, at.detach()))
+        near = self.closely(windows(pictures, at.detach()))
         looks = (weights @ found.flatten(2).transpose(1, 2)).flatten(1)
         places, near = at.flatten(1), near.view(len(at), -1)
         said = self.say(torch.cat([places, looks, near, found.amax((2, 3)), found.mean((2, 3))], 1))
@@ -106,7 +106,7 @@ class Network(nn.Module):
         return [eye(2.0 * pictures[name] - 1.0) for name, eye in self.eyes.items()]
 
 
-def _windows(pictures: Tensor, places: Tensor) -> Tensor:
+def windows(pictures: Tensor, places: Tensor) -> Tensor:
     """Return what is around places of pictures, (B · o, 3 · scales, window, window).
 
     Args:

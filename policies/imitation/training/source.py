@@ -28,7 +28,7 @@ from handrail.policies.imitation.interface.interface import (
     STATE,
     PolicyInterface,
 )
-from handrail.policies.imitation.training.encoded import encoded, has_pictures, tellable
+from handrail.policies.imitation.training.encoded import encoded, tellable
 from handrail.policies.imitation.training.memory import (
     PICTURES,
     MemoryDataset,
@@ -181,18 +181,21 @@ def _interpreted(
     """Return what a policy learns through an interface."""
     if actions == "intent":
         _check_one_mode(selection, config.mode)
-    missing = [key for key in COLUMNS if key not in info.features]
-    if missing:
+    features = dict(info.features)
+    if encoder and ENVIRONMENT not in features:
+        names = encoder.reads.interface.environment_names
+        features[ENVIRONMENT] = Feature("float32", (len(names),), names)
+    if missing := [key for key in COLUMNS if key not in features]:
         words = f"found no {', '.join(missing)}; for other datasets say --actions recorded"
         raise HandrailError(f"--actions {actions}: expected the columns of handrail-record, {words}")
     masks = _episodes(info, selection, [MASK])
-    interface = PolicyInterface.of_dataset(info.features, masks, actions, config.base_pose)
+    interface = PolicyInterface.of_dataset(features, masks, actions, config.base_pose)
 
     def learnt(episode: Columns) -> Columns:
         state, environment = interface.observe(episode[STATE], episode[ENVIRONMENT])
         return {STATE: state, ENVIRONMENT: environment, ACTION: interface.encode(episode)}
 
-    episodes = _episodes(info, selection, COLUMNS)
+    episodes = _episodes(info, selection, [key for key in COLUMNS if key in info.features])
     if encoder:
         _check_fits(encoder, interface)
         episodes = _encoded(info, selection, encoder, episodes)
@@ -214,12 +217,10 @@ def _check_fits(encoder: Encoder, interface: PolicyInterface) -> None:
 def _encoded(
     info: DatasetInfo, selection: Selection, encoder: Encoder, episodes: Iterable[Columns]
 ) -> Iterator[Columns]:
-    """Yield episodes with what the encoder says, or would say if it were never off, of where things are."""
-    seen = has_pictures(info, encoder)
+    """Yield episodes with what an encoder can say of where things are: the truth, where it was recorded."""
     for row, episode in zip(selection.rows, episodes, strict=True):
-        said = (
-            encoded(info, row, episode[STATE], encoder) if seen else tellable(episode[ENVIRONMENT], encoder)
-        )
+        truth = episode.get(ENVIRONMENT)
+        said = encoded(info, row, episode[STATE], encoder) if truth is None else tellable(truth, encoder)
         yield episode | {ENVIRONMENT: said}
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors.torch import save_file
+from scipy.spatial.transform import Rotation
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, session_features
@@ -12,9 +13,16 @@ from handrail.policies.imitation.interface.compute import device_of
 from handrail.policies.imitation.interface.encoder import Encoder, Reads, Said, find_encoder, same
 from handrail.policies.imitation.interface.encoder_step import encoder_step
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
-from handrail.policies.imitation.interface.network import Eye
+from handrail.policies.imitation.interface.network import Eye, windows
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
-from handrail.policies.imitation.interface.views import PLACED, CameraMount, in_picture, placed, spread
+from handrail.policies.imitation.interface.views import (
+    PLACED,
+    CameraMount,
+    facing,
+    in_picture,
+    placed,
+    spread,
+)
 
 SIZE = (32, 48)
 
@@ -237,8 +245,32 @@ def test_an_eye_says_where_in_a_picture_something_is(size):
     said, heat = eye(shown)
     u, v = said[0, :2].tolist()
     assert heat.exp().sum((2, 3)).item() == pytest.approx(1.0)
-    assert u == pytest.approx(2.0 * (column + 3.5) / (size[1] - 1) - 1.0, abs=0.1)
-    assert v == pytest.approx(2.0 * (row + 3.5) / (size[0] - 1) - 1.0, abs=0.1)
+    assert u == pytest.approx(2.0 * (column + 4) / size[1] - 1.0, abs=0.02)
+    assert v == pytest.approx(2.0 * (row + 4) / size[0] - 1.0, abs=0.02)
+
+
+def test_it_looks_closely_at_what_it_found():
+    """Windows are of the picture itself, around each place; the second shows four times as much."""
+    shown = torch.rand(2, 3, 360, 640)
+    places = torch.tensor([[[2 * 100 / 640 - 1, 2 * 60 / 360 - 1], [0.0, 0.0]]] * 2)
+    near = windows(shown, places)
+    assert near.shape == (4, 6, 32, 32)
+    torch.testing.assert_close(near[2, :3], shown[1, :, 44:76, 84:116], atol=1e-4, rtol=0)
+    wide = torch.nn.functional.avg_pool2d(shown[1], 4)[:, 29:61, 64:96]
+    torch.testing.assert_close(near[3, 3:], wide, atol=1e-4, rtol=0)
+
+
+def test_a_thing_looks_the_same_wherever_it_is_in_the_picture():
+    """What is said of its turn is as from a camera that faces it."""
+    ways = np.random.default_rng(0).normal(size=(20, 3))
+    turned = facing(ways)
+    away = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    np.testing.assert_allclose(turned @ [0.0, 0.0, -1.0], away, atol=1e-9)
+    np.testing.assert_allclose(
+        turned.swapaxes(1, 2) @ turned, np.broadcast_to(np.eye(3), (20, 3, 3)), atol=1e-9
+    )
+    angles = Rotation.from_matrix(turned).magnitude()  # the least: none about the way itself
+    np.testing.assert_allclose(np.cos(angles), -away[:, 2], atol=1e-9)
 
 
 def test_a_place_in_two_pictures_is_a_place_in_space():
@@ -259,7 +291,7 @@ def test_a_place_in_two_pictures_is_a_place_in_space():
         np.testing.assert_allclose(ray[0], way / np.linalg.norm(way), atol=1e-6)
         again = in_picture(torch.from_numpy(d), torch.tensor([mount.slope], dtype=torch.float64), SIZE)
         np.testing.assert_allclose(again[0], [u, v], atol=1e-6)
-        off = spread(ray @ turn.T, width)
+        off = spread(d @ turn.T, width)
         seen.append(Said(pose.tool, place + d @ turn.T, off, np.eye(3)[None], np.ones(1)))
     others = {name: said([0.0, 0.0, 0.0]) for name in ("bin", "cube_table", "bin_table")}
     memory = SceneMemory(reads())
