@@ -35,9 +35,8 @@ intents = ["ee"]                of these modes also the operator's intent is lea
 draws = 2                       on the first so many draws
 same_number = 1                 draws of which policies also learn from `episodes` demonstrations each
 
-[pictures]                      optional: policies see these in place of where things are
-cameras = ["wrist", "scene"]
-size = 96                       of a picture, its height and width [px]
+[encoders]                      optional: policies look through these, one a task, when they drive: they are not
+reach = "ridgeback_ur10-reach"  told where things are
 
 [robustness]                    optional, exploratory: what else policies go through
 perturbations = ["push", "shift", "delay"]      each a condition of its own; [] for none
@@ -47,7 +46,7 @@ draws = 1                       the first so many
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from msgspec import Meta
@@ -117,14 +116,6 @@ class Beside:
 
 
 @dataclass(frozen=True)
-class Pictures:
-    """What policies see in place of where things are; explained above."""
-
-    cameras: tuple[str, ...] = ("wrist", "scene")
-    size: int = 96
-
-
-@dataclass(frozen=True)
 class Robustness:
     """What else policies of the main design go through; explained above."""
 
@@ -150,7 +141,7 @@ class StudyDesign:
     flat: Flat | None = None
     factors: Factors | None = None
     beside: Beside | None = None
-    pictures: Pictures | None = None
+    encoders: Mapping[str, str] = field(default_factory=dict)
     robustness: Robustness | None = None
     digest: str = ""  # of what its file says, comments left out; "" where it comes from no file
 
@@ -164,6 +155,9 @@ class StudyDesign:
         check_known("mode", self.modes, MODES)
         check_known("task", self.tasks, TASKS)
         check_known("baseline", (self.baseline,), self.modes)
+        if self.encoders and self.encoders.keys() != self.tasks.keys():
+            words = f"expected one of each task ({', '.join(self.tasks)}) or none"
+            raise HandrailError(f"study {self.name}: encoders: {words}, got {', '.join(self.encoders)}")
         once: dict[str, tuple[str, ...]] = {"modes": self.modes}
         draws: dict[str, int] = {}
         if factors := self.factors:

@@ -29,7 +29,6 @@ def seed_of(design: StudyDesign, cell: StudyCell) -> int:
 
 def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
     """Return how the next turn of a dataset is recorded, `so_far` episodes being in it."""
-    seen = design.pictures
     return RecordConfig(
         task=cell.task,
         mode=cell.mode,
@@ -43,7 +42,6 @@ def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0)
         ),
         resume=root.exists(),
         workers=1,  # a job has one core
-        **({"cameras": ",".join(seen.cameras), "image_size": seen.size} if seen else {}),
     )
 
 
@@ -66,8 +64,7 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
         draw=policy.cell.draw,
         minutes=task.minutes if timed else 0.0,
         episodes=0 if timed else task.episodes,
-        images=design.pictures is not None,
-        scene=design.pictures is None,
+        encoder=design.encoders.get(policy.cell.task, ""),
         resume=True,
         **ended,
     )
@@ -101,19 +98,22 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     Of a dataset `recording` says what it is; `wanted` may grow. A policy depends on both, on its `training`
     and on its `evaluations`.
     """
-    cell, pictures = job.cell, design.pictures is not None
+    cell = job.cell
     config, task = recording(cell, design, _DATASET), design.tasks[cell.task]
     recorded = _some(config, _RECORDED) | {
         "persons": design.persons,
         "turn": BATCH,
         "fps": config.dataset.fps,
     }
-    recorded |= _some(config, ("cameras", "image_size") if pictures else ())
     found = {"recording": recorded, "wanted": {"episodes": task.episodes, "minutes": task.minutes}}
     if job.policy is None:
         return found
     learnt = training(job.policy, design, _DATASET, _POLICY)
-    trained = _some(learnt, (*_LEARNT, *(("images", "scene") if pictures else ())))
+    trained = _some(learnt, _LEARNT)
+    if learnt.encoder:
+        from handrail.policies.imitation.interface.encoder import find_encoder
+
+        trained |= {"encoder": learnt.encoder, "weights": find_encoder(learnt.encoder).digest}
     driven = {what: _some(each, _DRIVEN) for what, each in evaluations(job, design).items()}
     return found | {"training": trained | {"sizes": as_json(resolved(learnt))}, "evaluations": driven}
 

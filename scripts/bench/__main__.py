@@ -54,9 +54,6 @@ BENCHES = {
         "latency.measure:LatencyConfig",
         "latency.measure:main",
     ),
-    "scaling": Bench(
-        "episodes a second with several workers", "scaling.scaling:ScalingConfig", "scaling.scaling:main"
-    ),
     "soak": Bench("hours of commands and faults", "soak.soak:SoakConfig", "soak.soak:main"),
 }
 

@@ -19,7 +19,6 @@ SMALL = {  # what a command gets, given on the page or not
     "handrail-evaluate": "--episodes 2 --time_limit 1 --workers 1",
     "bench operators": "--episodes 1 --workers 1",
     "bench goal_reaching": "--goals 2 --workers 1",
-    "bench scaling": "--episodes 2",
     "bench cases": "--seconds 1",
     "bench speed": "--updates 10 --solves 1 --tasks reach --degrees 9 --pairs 0 --horizons 10 --peers daqp",
     "bench rl": "--steps 60 --random_steps 20 --save_every 30 --goals 1 --final_goals 1 --layers 8",

@@ -1,6 +1,5 @@
 """On a Ray cluster of two computers, both here, jobs give what they give anywhere, also when one is lost."""
 
-import json
 import os
 import signal
 import subprocess
@@ -13,6 +12,8 @@ from command_helpers import ran, refused
 from datasets_helpers import tree
 from ray_helpers import record_with_a_loss
 from shared_helpers import content, saved, started, wait_until
+
+from handrail.datasets.reading.digest import digest_of_dataset
 
 pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
@@ -67,13 +68,10 @@ def test_an_interrupt_ends_all_at_once_and_one_core_goes_on(cluster, alone, tmp_
 
 
 def test_the_same_rows_from_one_two_and_three_workers_and_from_the_cluster(cluster, tmp_path):
-    file = tmp_path / "scaling.json"
-    flags = ["--episodes", 12, "--workers", "1,2,3", "--ray", cluster.address, "--folder", tmp_path]
-    said = ran(*flags, "--json", file, name="bench scaling")
-    runs = json.loads(file.read_text())["runs"]
-    assert [(run["workers"], run["ray"]) for run in runs] == [(1, False), (2, False), (3, False), (2, True)]
-    assert len({run["rows"] for run in runs}) == 1
-    assert "2 on Ray" in said
+    places = *(("--workers", count) for count in (1, 2, 3)), ("--ray", cluster.address)
+    for number, where in enumerate(places):
+        ran(tmp_path / str(number), *FLAGS, "--dataset.num_episodes", 12, *where)
+    assert len({digest_of_dataset(tmp_path / str(number)) for number in range(len(places))}) == 1
 
 
 def test_no_cluster_is_one_line(tmp_path):

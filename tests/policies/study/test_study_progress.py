@@ -13,7 +13,7 @@ from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.imitation.training import presets
 from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import Flat, Pictures
+from handrail.policies.study.design import Flat
 from handrail.policies.study.jobs import jobs
 from handrail.policies.study.load import load_design
 from handrail.policies.study.progress import StudyProgress, read_json
@@ -82,7 +82,8 @@ def test_every_setting_of_the_design_is_part_of_what_something_depends_on(preset
 
     others = [dataclasses.replace(design, **{key: value}) for key, value in (
         ("policy", "diffusion"), ("rollouts", 41), ("persons", 1), ("seed", 1), ("flat", Flat()),
-        ("beside", None), ("robustness", None), ("draws", 3), ("pictures", Pictures(("wrist",))),
+        ("beside", None), ("robustness", None), ("draws", 3),
+        ("encoders", dict.fromkeys(design.tasks, "ridgeback_ur10-reach")),
         *(("flat", Flat(**{name: 0.5})) for name in ("held_out", "improvement")),
         *(("flat", Flat(**{name: 7})) for name in ("every", "patience")),
     )]  # fmt: skip

@@ -22,7 +22,6 @@ WRONG = (
     ("rl", "--tau 2", "--tau: expected"),
     ("rl", "--steps 0", "--steps"),
     ("latency", "--browser /none", "--browser /none: expected a program"),
-    ("scaling", "--workers x", "--workers"),
     ("soak", "--hours nan", "--hours: expected"),
 )
 
