@@ -35,8 +35,8 @@ intents = ["ee"]                of these modes also the operator's intent is lea
 draws = 2                       on the first so many draws
 same_number = 1                 draws of which policies also learn from `episodes` demonstrations each
 
-[encoders]                      optional: policies look through these, one a task, when they drive: they are not
-reach = "ridgeback_ur10-reach"  told where things are
+[encoders]                      optional: policies look through these, one a task, when they drive: nobody
+reach = "ridgeback_ur10-reach"  tells them where things are
 
 [robustness]                    optional, exploratory: what else policies go through
 perturbations = ["push", "shift", "delay"]      each a condition of its own; [] for none
