@@ -35,7 +35,7 @@ from handrail.policies.imitation.interface.views import CameraMount
 FPS = 20
 _DRIVEN = ("ee", "direct")  # modes of the scripts
 _EPISODES = 3  # of a chunk
-_OWN, _MOVED = 0.06, 0.10  # share of an episode's frames
+_OWN, _MOVED = 36, 60  # of an episode that takes all the time that its task gives
 _POSES = 5  # at which a scene is seen
 _FARTHEST = 0.5  # standard deviation by which the robot is moved at most [m · scale/2, rad]
 _RANDOMISED = 4  # every so-many-th chunk
@@ -120,6 +120,7 @@ class _Watcher:
 
     def __init__(self, env: HandrailEnv, cameras: tuple[str, ...], rng: np.random.Generator) -> None:
         self._env, self._cameras, self._rng = env, cameras, rng
+        self._frames = env.task.horizon * env.fps
         self._agent = AgentObservation(env.model)
         self.rows: list[Samples] = []
         self.been: list[FloatArray] = []
@@ -131,7 +132,7 @@ class _Watcher:
     def see(self, frame: Frame) -> None:
         """Take some of the moments."""
         simulation = self._env.simulation
-        q, number = simulation.state().q.copy(), self._rng.random()
+        q, number = simulation.state().q.copy(), self._frames * self._rng.random()
         self.been.append(q)
         if number < _OWN:
             self.take(DRIVEN)

@@ -25,7 +25,7 @@ from handrail.policies.imitation.interface.relative import POSE, rotations
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.views import PLACED, facing, in_picture, placed
 
-_KEPT = 1e9  # of samples to draw from [byte]
+_KEPT = 2e9  # of samples to draw from [byte]
 _WARMUP = 200  # updates
 _FALL = 0.6  # share of the updates from which on the learning rate falls, along a cosine
 _AVERAGED = 0.998  # of the weights, an update
