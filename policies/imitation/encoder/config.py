@@ -33,7 +33,7 @@ class EncoderConfig:
     """Cameras of the robot that it reads."""
     image_size: int | str = 224
     """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
-    updates: AtLeastOne = 4000
+    updates: AtLeastOne = 3000
     """Of the network."""
     batch_size: Advanced[AtLeastOne] = 32
     """Samples an update."""
