@@ -20,6 +20,7 @@ _STANDS, _MOVES = (0.0005, 0.002), (0.02, 0.10)  # √q, a frame: of the place [
 _REACH = 0.2  # from the tool, beside how far off that is [m]
 _FAR = 4.0  # standard deviations
 _DOUBT = 1.2  # by which P grows where what is said is farther
+_TURN = 0.5  # of the determinant of a rotation, which is 1: less is none
 _ALIKE = 4.0  # frames that say as much as one of what stands: what is off now is off a frame later
 
 
@@ -99,7 +100,7 @@ class _Known:
         self._spread = 0.5 * (kept + kept.T)
 
     def _take_turn(self, turn: FloatArray, off: float, alike: float) -> None:
-        if not (np.isfinite(turn).all() and np.isfinite(off)):
+        if not (np.isfinite(turn).all() and np.isfinite(off) and np.linalg.det(turn) > _TURN):
             return
         ways = turn @ self._same
         nearest = ways[np.argmax(np.einsum("kij,ij->k", ways, self._turn))]

@@ -182,6 +182,8 @@ def test_nan_is_never_remembered(bad):
     first = remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
     np.testing.assert_allclose(first[:3], [1.0, 0.0, 0.0])
     np.testing.assert_array_equal(remembered(memory, broken), first)
+    no_turn = said([1.0, 0.0, 0.0], 0.01, np.zeros((3, 3)))
+    np.testing.assert_allclose(remembered(memory, no_turn), first, atol=1e-9)
 
 
 def test_an_unknown_device_is_refused():
