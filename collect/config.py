@@ -62,6 +62,8 @@ class SessionConfig:
     """Cameras of the robot to record, such as front,wrist; scene overlooks it; all, or none by default."""
     image_size: Advanced[int | str] = 128
     """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
+    hand: Advanced[str] = ""
+    """Which hand does the task, of a robot with several: its name; the first by default."""
     randomise: bool = False
     """Draw light, colours, textures, camera poses and fields of view anew in each episode, from its seed."""
     realtime: Advanced[bool] = False

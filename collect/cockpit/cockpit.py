@@ -194,7 +194,7 @@ class Cockpit:
             ],
             "refuses": sorted(self._refuses),
             "cameras": env.cameras,
-            "gripper": robot.end_effector.gripper is not None,
+            "gripper": any(hand.gripper for hand in robot.hands),
             "grips": bool(env.start.scene.movables),
             "episodes": self._episodes.described(),
             "folder": self._folder,

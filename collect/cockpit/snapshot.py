@@ -59,7 +59,7 @@ def reason(status: Status, contacts: Iterable[str], q: FloatArray, robot: RobotD
 def hand_ahead(model: RobotModel, intent: Intent, tool: Pose, q: FloatArray) -> Pose | None:
     """Return the hand's pose within `AHEAD`, at the velocity that is asked for; None where none is."""
     channels, asked = Channels.of(model.description), _asked(intent)
-    twist, joints = asked[channels.tool_slice], asked[channels.joint_slice]
+    twist, joints = asked[channels.hand_slice()], asked[channels.joint_slice]
     if twist.any():
         in_tool = intent.frames.tool == "tool"
         linear, angular = (tool.rotation @ part if in_tool else part for part in (twist[:3], twist[3:]))

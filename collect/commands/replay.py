@@ -129,7 +129,6 @@ def replay_one_of(
     frames = dataset.frames(episode, ["action", "observation.state"])
     actions, recorded = frames["action"], frames["observation.state"]
     skipped = _count(row.get(TRIMMED), _MOST_TRIMMED) or 0  # the robot stood still then
-    still = np.append(np.zeros(actions.shape[1] - 1), actions[0, -1]).astype(actions.dtype)
     limit = (skipped + len(actions) - 0.5) / info.fps
     config = replace(recorded_settings(row, said), time_limit=limit, **seen)
     taken: Pictures = []
@@ -150,6 +149,7 @@ def replay_one_of(
             if picture is not None and film:
                 film.add(picture)
 
+        still = np.where(np.arange(actions.shape[1]) < env.model.size, np.float32(0.0), actions[0])
         actions = np.vstack([np.tile(still, (skipped, 1)), actions])
         states, contacts, success = _run(env, seed, actions, info.fps, see, before)
     states = states[skipped:]
@@ -197,7 +197,7 @@ def _run(
     Args:
         env: of the episode; the robot may be sent several commands a frame.
         seed: of the episode.
-        actions: velocities at the ends of the frames, and gripper, (T, n + 1).
+        actions: velocities at the ends of the frames, and grippers, (T, n + h).
         fps: frames a second.
         see: is told the number of every frame at its end.
         before: is told it at the frame's beginning, with what is observed.
@@ -208,13 +208,13 @@ def _run(
     states, onsets, contacts = list[FloatArray](), 0, 0
     observation, info = env.reset(seed=seed)
     for frame in range(len(actions)):
-        action = actions[frame].astype(np.float64)
+        velocities, grippers = np.split(actions[frame].astype(np.float64), [env.model.size])
         states.append(observation["agent_pos"])
         before(frame, observation)
         last = np.array(env.state().commanded)
-        command = Command(np.stack([last, action[:-1], np.zeros(len(last))]), 1.0 / fps)
+        command = Command(np.stack([last, velocities, np.zeros(len(last))]), 1.0 / fps)
         for step in range(1, round(env.fps / fps) + 1):
-            sent = np.append(command.velocity(step * env.period), action[-1])
+            sent = np.append(command.velocity(step * env.period), grippers)
             observation, _, terminated, truncated, info = env.step(sent)
             onsets, contacts = onsets + max(info["contacts"] - contacts, 0), info["contacts"]
             if terminated or truncated:

@@ -63,7 +63,7 @@ class Card:
         chosen = [setting.mode.name]
         if setting.mode.by_focus:
             chosen.append(f"the {setting.focus}")
-        if meaning.mask(setting)[meaning.channels.tool_slice].any():
+        if meaning.mask(setting)[meaning.channels.hands_slice].any():
             chosen.append(f"frame {setting.frame}")
         chosen += [f"speed {setting.speed:.0%}", f"gripper {'closed' if self.grip else 'open'}"]
         chosen += [] if self.apart is None else [f"leader {np.degrees(self.apart):.0f}° from the arm"]

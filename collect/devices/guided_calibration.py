@@ -66,7 +66,7 @@ class _Guide:
         found = {name: joint for name in robot.arm_joints if (joint := self._joint(name))}
         if not found:
             raise HandrailError("calibrate: expected at least one joint of the leader, got none")
-        gripper = self._gripper() if robot.end_effector.gripper is not None else None
+        gripper = self._gripper() if robot.hands[0].gripper is not None else None
         self._ask("Stand the leader as the robot stands at the beginning, then press Enter: ")
         pose, home = self._positions(), dict(zip(robot.joints, np.asarray(robot.home), strict=True))
         joints = {

@@ -123,7 +123,7 @@ class LocalPerson:
         joints = mask[channels.joint_slice]
         arm = tuple(name for name, owned in zip(channels.joints[base:], joints[base:], strict=True) if owned)
         drives = bool(mask[channels.base_slice].any() or (base and joints[:base].all()))
-        return Steered(bool(mask[channels.tool_slice].any()), drives, arm)
+        return Steered(bool(mask[channels.hands_slice].any()), drives, arm)
 
     def _take(self, main: DeviceInput | None, other: DeviceInput | None, view: View) -> None:
         """Tell the person where the inputs are; that nobody drives, while a device that is needed is gone.

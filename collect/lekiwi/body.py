@@ -42,7 +42,7 @@ class LeKiwiBody:
         """Begin an episode."""
         self._env.reset(seed=seed)
         self._arm, self._twist = self._env.state().q[3:].copy(), np.zeros(3)
-        self._gripper = 0.0 if self._env.start.grip is None else 1.0
+        self._gripper = float(any(width is not None for width in self._env.start.grip))
         self._touching: frozenset[str] = frozenset()
         self.contacts, self.done_at = 0, math.nan
 
@@ -93,7 +93,7 @@ class LeKiwiBody:
         """Return what LeKiwi says: joint positions, and the speeds of its wheels as the base's."""
         state, world = self._env.state(), self._env.plant
         twist = turned(state.v[:3], -state.q[2])
-        return self._units.action(state.q[3:], state.v[3:], twist, 1.0 - world.opening)
+        return self._units.action(state.q[3:], state.v[3:], twist, 1.0 - world.openings[0])
 
     def picture(self, camera: str) -> np.ndarray:
         """Return what a camera of LeKiwi's sees, (height, width, 3)."""

@@ -124,9 +124,9 @@ class ClientPlant(Plant):
         return self._link.pictures(cameras, size)
 
     @property
-    def opening(self) -> float:
+    def openings(self) -> tuple[float, ...]:
         """How far the gripper is open, from 0 to 1."""
-        return self._link.body.opening
+        return (self._link.body.opening,)
 
     @property
     def contacts(self) -> tuple[str, ...]:

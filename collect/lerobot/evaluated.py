@@ -54,6 +54,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         self._actions = tuple(ModeAction(each, channels) for each in (own, _WHOLE))
         self._loop = mode_loop(env, config.task, own, _WHOLE)
         self._joined = scene_in_state
+        self._tools = [hand.named("tool") for hand in env.model.description.hands]
         self.observation_space = self._space_shown(env.observation_space)
         self.action_space = spaces.Box(-_MOST, _MOST, (len(self._actions[0].names),), np.float32)
         self._max_episode_steps = env._max_episode_steps  # LeRobot asks for it
@@ -116,7 +117,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         return shown | {
             "time": np.array([state.time], np.float32),
             "sent": state.commanded.astype(np.float32),
-            "obstacles": to_numbers(self._env.obstacles()),
+            "obstacles": to_numbers(self._env.obstacles(), self._tools),
         }
 
     def _info(self) -> dict[str, Any]:

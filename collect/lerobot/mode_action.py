@@ -1,6 +1,6 @@
 """What LeRobot's action is: the channels of a teleop mode as plain numbers, and back."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 
 import numpy as np
@@ -37,10 +37,12 @@ class ModeAction:
 
     def __init__(self, mode: TeleopMode, channels: Channels) -> None:
         self._mode, self._channels = mode, channels
-        self._hand, self._base = (channels.mask(*mode.groups(focus)) for focus in ("hand", "base"))
+        self._hand, self._base = (channels.mask(*mode.owned(focus)) for focus in ("hand", "base"))
         self._owned = np.flatnonzero(self._hand | self._base)
         focus = (_FOCUS,) if mode.by_focus else ()
-        self._own = (*(channels.names[i] for i in self._owned), *focus, _GRIPPER)
+        hands = [names[0].split(".")[0] for names in channels.hands]
+        self._grippers = (_GRIPPER,) if len(hands) == 1 else tuple(f"{hand}.{_GRIPPER}" for hand in hands)
+        self._own = (*(channels.names[i] for i in self._owned), *focus, *self._grippers)
         self.names = tuple(map(lerobot_name, self._own))
 
     def intent(self, numbers: ArrayLike, time: float) -> Intent:
@@ -50,12 +52,13 @@ class ModeAction:
         """
         numbers, values = np.asarray(numbers, float), np.zeros(self._channels.size)
         values[self._owned] = numbers[: len(self._owned)]
-        mask = self._base if self._mode.by_focus and not numbers[-2] <= _HALF else self._hand
-        return Intent(values, mask, decided_gripper(numbers[-1]), self._mode.name, time)
+        focus, grippers = numbers[len(self._owned)], numbers[-len(self._grippers) :]
+        mask = self._base if self._mode.by_focus and not focus <= _HALF else self._hand
+        return Intent(values, mask, tuple(map(decided_gripper, grippers)), self._mode.name, time)
 
     def is_in(self, action: Mapping[str, float]) -> bool:
         """Whether an action has a channel of the mode."""
-        return any(named(name, action) is not None for name in self._own[:-1])
+        return any(named(name, action) is not None for name in self._own[: -len(self._grippers)])
 
     def numbers(self, action: Mapping[str, float]) -> FloatArray:
         """Return the numbers of an action, by LeRobot's names or Handrail's own, in the order of `names`."""
@@ -77,15 +80,16 @@ class ModeAction:
         """
         values = np.where(intent.mask, intent.values, 0.0)
         if intent.frames.tool == "tool":
-            twist = values[self._channels.tool_slice].reshape(2, 3)
-            values[self._channels.tool_slice] = (twist @ rotation.T).ravel()
+            twist = values[self._channels.hand_slice()].reshape(2, 3)
+            values[self._channels.hand_slice()] = (twist @ rotation.T).ravel()
         focus = (np.array_equal(intent.mask, self._base),) if self._mode.by_focus else ()
-        numbers = (*values[self._owned], *focus, intent.gripper)
+        numbers = (*values[self._owned], *focus, *intent.grippers)
         return dict(zip(self.names, map(float, numbers), strict=True))
 
-    def still(self, gripper: float = 0.0) -> dict[str, float]:
-        """Return the action of who touches nothing, with the gripper as it is."""
-        return dict.fromkeys(self.names, 0.0) | {lerobot_name(_GRIPPER): gripper}
+    def still(self, grippers: Iterable[float] = ()) -> dict[str, float]:
+        """Return the action of who touches nothing, with grippers as they are; open where nothing is said."""
+        closed = zip(map(lerobot_name, self._grippers), grippers, strict=False)
+        return dict.fromkeys(self.names, 0.0) | dict(closed)
 
 
 def pressed(action: Mapping[str, float]) -> str:

@@ -149,9 +149,9 @@ class HandrailSim(Uncalibrated, Robot):
         return self.loop.look()
 
     @property
-    def gripper(self) -> float:
-        """What the gripper was sent last, 0 open, 1 closed."""
-        return float(self.loop.now.info["sent"][-1])
+    def grippers(self) -> tuple[float, ...]:
+        """What grippers were sent last, 0 open, 1 closed."""
+        return tuple(self.loop.now.info["sent"][self.env.model.size :].tolist())
 
     def connect(self, calibrate: bool = True) -> None:
         """Begin the first episode, everything compiled."""
@@ -217,7 +217,7 @@ class HandrailSim(Uncalibrated, Robot):
         self.loop.look()
         if not self.loop.rests:
             nothing = Intent.idle(self._channels, LONG_AGO)
-            self._move(replace(nothing, gripper=self.gripper, mode=self.mode.name), EpisodeEvent.PAUSE)
+            self._move(replace(nothing, grippers=self.grippers, mode=self.mode.name), EpisodeEvent.PAUSE)
 
     def _lead(self, positions: FloatArray) -> None:
         """Lead the joints towards positions, (n,) [m, rad], for a period; that is no part of the task."""
@@ -226,7 +226,7 @@ class HandrailSim(Uncalibrated, Robot):
         toward = (positions - before) * self.env.fps + FOLLOW * (positions - state.q)
         values[self._channels.joint_slice] = np.clip(toward, -fastest, fastest)
         mask = self._channels.mask("joint")
-        self._move(Intent(values, mask, self.gripper, _TOWARD.name, state.time), counts=False)
+        self._move(Intent(values, mask, self.grippers, _TOWARD.name, state.time), counts=False)
         self._led = positions
 
     def _move(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> None:
@@ -237,7 +237,8 @@ class HandrailSim(Uncalibrated, Robot):
     def _names(self) -> tuple[str, ...]:
         """LeRobot's names of the numbers; what is no part of the robot or the scene keeps its own."""
         seen = tuple(map(lerobot_name, (*self.env.agent_names, *self.env.state_names)))
-        sent = (f"sent.{name}" for name in (*self.env.model.joints, "gripper"))
+        grippers = (hand.named("gripper") for hand in self.env.model.description.hands)
+        sent = (f"sent.{name}" for name in (*self.env.model.joints, *grippers))
         return (*seen, *sent, *_TOLD) if self._config.diagnostics else seen
 
     def _numbers(self) -> dict[str, float]:

@@ -70,7 +70,7 @@ class SimTeleoperator(Uncalibrated, Teleoperator):
             raise HandrailError(f"{self.name}: expected connect() before anything else")
         robot = self.robot
         if button := self._pressed(robot):
-            return robot.action.still(robot.gripper) | {button: 1.0}
+            return robot.action.still(robot.grippers) | {button: 1.0}
         view = robot.view
         if robot.episodes != self._begun:
             if self.is_person:
@@ -81,7 +81,7 @@ class SimTeleoperator(Uncalibrated, Teleoperator):
             self._operator.see(robot.frame)
         asked = self._operator.act(view)
         if isinstance(asked, EpisodeEvent):
-            return robot.action.still(robot.gripper) | {_BUTTONS.get(asked, HOLD): 1.0}
+            return robot.action.still(robot.grippers) | {_BUTTONS.get(asked, HOLD): 1.0}
         return robot.action.action(asked, view.tool.rotation)
 
     @abstractmethod

@@ -25,6 +25,12 @@ class TeleopMode:
     """Whether the masked MPC takes on the objectives that a task brings, and the channels that the
     operator then leaves to them."""
 
+    def owned(self, focus: Focus, hand: str = "") -> tuple[str, ...]:
+        """Return the channel groups that the operator owns; `hand` is the one of several that is meant."""
+        name = hand or "ee"
+        own = (name if group == "hand" else group for group in self.groups(focus))
+        return tuple(name + group.removeprefix("ee") if group.startswith("ee.") else group for group in own)
+
     @property
     def by_focus(self) -> bool:
         """Whether the operator owns other channels while they drive the base."""
@@ -34,13 +40,13 @@ class TeleopMode:
         """Return the mode of an operator who releases some tool channels, and owns some more while driving.
 
         Args:
-            released: channels of the tool that the group `ee` loses; a mode that names channels keeps them.
+            released: channels of the tool that the group `hand` loses; a mode that names channels keeps them.
             owned: channels that are owned too while the operator, who steers by focus, drives the base.
         """
         kept = tuple(name for name in TOOL if name not in released)
 
         def groups(focus: Focus) -> tuple[str, ...]:
-            own = (name for group in self.groups(focus) for name in (kept if group == "ee" else (group,)))
+            own = (name for group in self.groups(focus) for name in (kept if group == "hand" else (group,)))
             return (*own, *(owned if self.by_focus and focus == "base" else ()))
 
         return replace(self, groups=groups) if released or owned else self
@@ -53,7 +59,7 @@ def always(*groups: str) -> Callable[[Focus], tuple[str, ...]]:
 
 def base_or_hand(focus: Focus) -> tuple[str, ...]:
     """Return the mask of the base's twist or the hand's."""
-    return ("base",) if focus == "base" else ("ee",)
+    return ("base",) if focus == "base" else ("hand",)
 
 
 MASK = "mask:"  # the name of a mode of one's own begins so
@@ -80,22 +86,22 @@ MODES = Registry(
     "mode",
     TeleopMode,
     (
-        TeleopMode("ee", always("ee"), "mpc", "steer the hand; the base comes along by itself"),
+        TeleopMode("ee", always("hand"), "mpc", "steer the hand; the base comes along by itself"),
         TeleopMode(
             "ee_whole",
-            always("ee"),
+            always("hand"),
             "mpc",
             "steer the hand, its tilt too: ee without the objectives that a task brings (tray)",
             task_objectives=False,
         ),
         TeleopMode(
             "ee_dls",
-            always("ee"),
+            always("hand"),
             "dls",
             "steer the hand; base and arm follow by damped least squares: ee without the MPC",
         ),
         TeleopMode("base", always("base"), "mpc", "steer the base; the arm keeps clear by itself"),
-        TeleopMode("base+ee", always("base", "ee"), "mpc", "steer base and hand at once"),
+        TeleopMode("base+ee", always("base", "hand"), "mpc", "steer base and hand at once"),
         TeleopMode("joints", always("joint"), "mpc", "steer every joint, kept safe by the MPC"),
         TeleopMode("switching", base_or_hand, "mpc", "drive the base, then steer the hand"),
         TeleopMode(

@@ -118,6 +118,8 @@ class MaskedMpcStep(RobotActionProcessorStep):
         """Build the controller."""
         check_settings(self, NAME)
         model = load_model(self.robot)
+        if len(model.description.hands) > 1:
+            raise HandrailError(f"{NAME}: expected a robot with one hand, got {self.robot}")
         channels, units = Channels.of(model.description), robot_units(self.units, model.description)
         self._around, self._action_names = parsed_obstacles(self.obstacles), units.action_names
         frames = Frames(self.base_frame, self.tool_frame)
@@ -148,7 +150,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         command = self._mpc.update(state, intent)
         self.diagnostics = command.diagnostics
         self._note_brake(command.diagnostics)
-        return self._body.send(np.append(command.velocity(1.0 / self.fps), command.gripper))
+        return self._body.send(np.append(command.velocity(1.0 / self.fps), command.grippers))
 
     def get_config(self) -> dict[str, Any]:
         """Return the settings."""

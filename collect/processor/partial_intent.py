@@ -93,4 +93,4 @@ class PartialIntent:
             else:
                 values[:], mask[:] = math.nan, True
         self._grip = grip if math.isfinite(grip) else self._grip
-        return Intent(values, mask, grip, "processor", stamp, self._frames)
+        return Intent(values, mask, (grip,), "processor", stamp, self._frames)

@@ -198,7 +198,7 @@ def robot_units(said: str | Mapping[str, Any], description: RobotDescription) ->
     if not isinstance(said, str):
         return RobotUnits(description, decoded(said, UnitsTable, "units"))
     arm, plain_base = description.arm_joints, BaseUnits(unit="radians") if description.base.joints else None
-    plain_gripper = GripperUnits("gripper.pos", 0.0, 1.0) if description.end_effector.gripper else None
+    plain_gripper = GripperUnits("gripper.pos", 0.0, 1.0) if description.hands[0].gripper else None
     known = {
         "lekiwi": UnitsTable(
             {name: JointUnits(f"arm_{name}") for name in arm},

@@ -60,7 +60,7 @@ class WholeBody:
     ) -> None:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
         self._b = len(model.description.base.joints)
-        gripper = model.description.end_effector.gripper
+        gripper = model.description.hands[0].gripper
         self._grip_step = period * (gripper.speed / gripper.stroke if gripper else _STROKES)
         self.reset()
 
@@ -142,7 +142,7 @@ class WholeBody:
         self.targets = np.clip(self.targets + max(share, 0.0) * way, arm - _LEAD, arm + _LEAD)
         self._held[b:] = share < 1.0
         self._twist = turned(self._gate.velocity[:3], -base[2]) if b else np.zeros(3)
-        self._grip += float(np.clip(self._gate.gripper - self._grip, -self._grip_step, self._grip_step))
+        self._grip += float(np.clip(self._gate.grippers[0] - self._grip, -self._grip_step, self._grip_step))
         return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grip)
 
     def _go_on(self, now: float) -> None:

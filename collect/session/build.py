@@ -24,8 +24,9 @@ from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
+from handrail.controllers.objectives.together import together
 from handrail.controllers.registry import resolved
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import frame_features
 
@@ -55,7 +56,7 @@ def build_env(
     task = build_task(config)
     return HandrailEnv(
         task,
-        config.robot,
+        load_model(config.robot).with_hand(config.hand),
         fps=config.robot_fps or fps,
         plant=plant or (Simulation if config.physics else IdealRobot),
         real=plant is not None,
@@ -125,7 +126,8 @@ def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str 
     make = TASKS.find(task).objectives if task and mode.task_objectives else None
     of_task = resolved(make)(channels) if make else ()
     centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
-    return build(model, 1.0 / fps, (*of_task, *centring))
+    pair = (together(channels),) if channels.pair else ()
+    return build(model, 1.0 / fps, (*of_task, *centring, *pair))
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
@@ -157,4 +159,5 @@ def session_features(env: HandrailEnv) -> dict[str, Feature]:
         channels=Channels.of(env.model.description).names,
         cameras=env.cameras,
         image_size=env.image_size,
+        grippers=[hand.named("gripper") for hand in env.model.description.hands],
     )

@@ -192,7 +192,7 @@ def _draw(base: int, joints: int, size: float, rng: np.random.Generator) -> Floa
 
 def _moved(model: RobotModel, start: Start, step: FloatArray) -> Start:
     """Return the start with the robot displaced; what it holds moves with the hand."""
-    if start.grip is None:
+    if not any(width is not None for width in start.grip):
         return replace(start, q=start.q + step)
     q = start.q + np.where(np.arange(model.size) < len(model.description.base.joints), step, 0.0)
     before, after = model.pose(start.q), model.pose(q)

@@ -141,10 +141,12 @@ class EpisodeLoop:
             counts: whether the task judges this step.
         """
         env, now, tally, seen = self.env, self.now, self.now.tally, self.now.observation
+        intent = intent.of_hands(len(env.model.description.hands))
         with tally.timed("controller"):
             action = self._action(intent)
-            if event is EpisodeEvent.PAUSE and np.abs(action[:-1]).max() < _CREEP:
-                action[:-1] = 0.0  # a controller may come ever nearer to rest
+            joints = action[: env.model.size]
+            if event is EpisodeEvent.PAUSE and np.abs(joints).max() < _CREEP:
+                joints[:] = 0.0  # a controller may come ever nearer to rest
         commanded = tally.elapsed
         with tally.timed("environment"):
             for disturbance in self._disturbances:
@@ -188,7 +190,7 @@ class EpisodeLoop:
         self.now.asked, self.now.due = tally.frames, self.time
 
     def _action(self, intent: Intent) -> FloatArray:
-        """Return what to send now: the velocities at the end of the step, and the gripper, (n + 1,).
+        """Return what to send now: the velocities at the end of the step, and grippers, (n + h,).
 
         The controller is asked if that is due; before, it is told what there is to avoid, if that can have
         changed: while things move or are held.
@@ -202,7 +204,7 @@ class EpisodeLoop:
             now.asked, now.due = step, now.due + self.control_period
             self.tally.updated(now.command)
         time = (step + 1 - now.asked) * self.env.period
-        return np.concatenate((now.command.velocity(time), (now.command.gripper,)))
+        return np.concatenate((now.command.velocity(time), now.command.grippers))
 
     @property
     def _holds(self) -> bool:

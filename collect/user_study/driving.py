@@ -64,7 +64,7 @@ class Driving:
         self._recording = Recording(config, env, [self._cockpit])
         self._recording.into(writer)
         self._recording.warm_up(seed)
-        mask = channels.mask(*modes[mode].groups("hand")) | channels.mask(*modes[mode].groups("base"))
+        mask = channels.mask(*modes[mode].owned("hand")) | channels.mask(*modes[mode].owned("base"))
         owned = tuple(name for name, own in zip(channels.names, mask, strict=True) if own)
         return Briefing(env.task.description, modes[mode].help, owned)
 

@@ -1,10 +1,11 @@
 """Looks at contacts: those that a robot should not have, and those by which it holds a thing."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from handrail.collect.world.geometry import ROBOT_BIT
 from handrail.collect.world.gl import MjData, MjModel
-from handrail.collect.world.gripper import FINGERS
 from handrail.collect.world.scene import Scene
 from handrail.controllers.arrays import FloatArray, IntArray
 
@@ -21,10 +22,12 @@ class Contacts:
         model: the compiled model.
         scene: what stands around the robot.
         grasp: names of the geoms that may touch movable things.
-        grips: whether there are fingers that can hold something.
+        fingers: names of the geoms of each hand's two, which can hold something; () of one that cannot.
     """
 
-    def __init__(self, model: MjModel, scene: Scene, grasp: tuple[str, ...], grips: bool) -> None:
+    def __init__(
+        self, model: MjModel, scene: Scene, grasp: tuple[str, ...], fingers: Sequence[Sequence[str]]
+    ) -> None:
         self._model = model
         kinds = np.where(model.geom_contype == ROBOT_BIT, _ROBOT, 0)
         kinds[[model.geom(name).id for name in grasp]] = _GRASP
@@ -36,7 +39,7 @@ class Contacts:
         self._forbidden = forbidden[np.ix_(kinds, kinds)]
         self._pairs: set[tuple[int, int]] = set()
         self._seen: dict[bytes, list[tuple[int, int]]] = {}  # forbidden ones, by all that touch
-        self._fingers = [model.geom(name).id for name in FINGERS] if grips else []
+        self._fingers = [[model.geom(name).id for name in pair] for pair in fingers]
         self._portable = {bodies[item.name]: item.name for item in scene.movables if item.portable}
 
     def clear(self) -> None:
@@ -59,19 +62,20 @@ class Contacts:
         pairs = (sorted(self._model.geom(geom).name for geom in pair) for pair in self._pairs)
         return tuple(sorted(" – ".join(pair) for pair in pairs))
 
-    def held(self, data: MjData) -> tuple[str, ...]:
-        """Return the names of what is held at this instant."""
-        if not (self._fingers and self._portable and data.ncon):
-            return ()
+    def held(self, data: MjData) -> dict[str, int]:
+        """Return what is held at this instant, and by which hand: the first of those that do."""
+        found: dict[str, int] = {}
+        if not (self._portable and data.ncon):
+            return found
         touching = data.contact.geom
-        if not all((touching == finger).any() for finger in self._fingers):
-            return ()
-        left, right = (self._pushes(touching, data.contact.frame, finger) for finger in self._fingers)
-        return tuple(
-            name
-            for body, name in self._portable.items()
-            if body in left and body in right and left[body] @ right[body] < 0.0
-        )
+        for hand, fingers in enumerate(self._fingers):
+            if not fingers or not all((touching == finger).any() for finger in fingers):
+                continue
+            left, right = (self._pushes(touching, data.contact.frame, finger) for finger in fingers)
+            for body, name in self._portable.items():
+                if body in left and body in right and left[body] @ right[body] < 0.0:
+                    found.setdefault(name, hand)
+        return found
 
     def _pushes(self, touching: IntArray, frames: FloatArray, finger: int) -> dict[int, FloatArray]:
         """Return which way a finger pushes what it touches: sums of unit normals, (3,), by body."""

@@ -30,13 +30,13 @@ RENDER_SIZE = (480, 640)  # height, width [px]
 class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A robot does a task.
 
-    Action, (n + 1,) float32: the generalised velocities that the robot shall have at the end of the step
-    [m/s, rad/s], reached linearly from those commanded before, and the gripper (0 open, 1 closed). What is
+    Action, (n + h,) float32: the generalised velocities that the robot shall have at the end of the step
+    [m/s, rad/s], reached linearly from those commanded before, and each gripper (0 open, 1 closed). What is
     sent is inside the robot's limits; an action that is not finite brakes.
 
     Args:
         task: a `Task`, or the name of its class as `module:Class`.
-        robot: name of a robot, its description file, or its model.
+        robot: name of a robot, its description file, or its model, which says the hand that does the task.
         fps: steps a second, 10 to 100.
         plant: makes the robot in its world, as the class `Simulation` does: MuJoCo's, or another.
         cameras: which of the robot's, or `scene`, to show as `pixels`.
@@ -91,8 +91,9 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)
         self.agent_names, self.state_names = self._agent.names, self.task.state_names
-        limit = np.append(self.model.description.limits.velocity, 1.0).astype(np.float32)
-        self.action_space = spaces.Box(np.append(-limit[:-1], np.float32(0.0)), limit, dtype=np.float32)
+        fastest, hands = self.model.description.limits.velocity, len(self.model.description.hands)
+        limit, least = (np.append(*each) for each in ((fastest, np.ones(hands)), (-fastest, np.zeros(hands))))
+        self.action_space = spaces.Box(least.astype(np.float32), limit.astype(np.float32), dtype=np.float32)
         seen = {
             "agent_pos": box_space(len(self.agent_names)),
             "environment_state": box_space(len(self.state_names)),
@@ -145,13 +146,14 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         start, now = self._episode
         return TaskState(
             time=now.time,
-            tool=now.tool,
-            opening=now.opening,
+            tools=now.tools,
+            openings=now.openings,
             start=start,
             poses=now.poses(),
             still=now.still(),
             stable=now.is_stable,
             scale=self.model.description.world.scale,
+            hand=self.model.number,
         )
 
     def reset(
@@ -166,12 +168,20 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         start: Start = (options or {}).get("start") or self._sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
-        plant = self._build(self.model, start.scene, start.q, self.period, meshes=meshes, grip=start.grip)
+        grip = self._by_hand(start.grip)
+        plant = self._build(self.model, start.scene, start.q, self.period, meshes=meshes, grip=grip)
         if meshes and isinstance(plant, Simulation):
             plant.dress(self._looks, self.np_random.spawn(1)[0])  # which draws nothing from it
         self._begun, self._steps = (start, plant), 0
-        rest = np.append(np.zeros(self.model.size), float(start.grip is not None))
+        rest = np.append(np.zeros(self.model.size), [float(width is not None) for width in grip])
         return self._shown(self.task_state(), rest.astype(np.float32))
+
+    def _by_hand(self, grip: tuple[float | None, ...]) -> tuple[float | None, ...]:
+        """Return the width that each hand holds, of widths that begin with the hand that does the task."""
+        hands, first = range(len(self.model.description.hands)), self.model.number
+        order = [first, *(hand for hand in hands if hand != first)]
+        held = dict(zip(order, grip, strict=False))
+        return tuple(held.get(hand) for hand in hands)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move for 1/fps seconds; the reward is 1 at success. `info["sent"]` is the action that was sent."""
@@ -200,7 +210,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "time": state.time,
         }
         observation: Observation = {
-            "agent_pos": self._agent.read(self.seen[0], state.tool, state.opening),
+            "agent_pos": self._agent.read(self.seen[0], state.tools, state.openings),
             "environment_state": bounded(self.task.features(state)),
         }
         if self.cameras:

@@ -25,7 +25,7 @@ class IdealRobot(Plant):
         q: where it begins, (n,).
         step: from one command to the next [s].
         meshes: taken for the sake of MuJoCo's robot; there is nothing to draw.
-        grip: None, for nothing can be held.
+        grip: nothing, for nothing can be held.
         gate: what every command passes; by default one that sends a dataset's numbers.
     """
 
@@ -36,10 +36,10 @@ class IdealRobot(Plant):
         q: FloatArray,
         step: float,
         meshes: bool = False,
-        grip: float | None = None,
+        grip: tuple[float | None, ...] = (),
         gate: Gate | None = None,
     ) -> None:
-        if scene.movables or grip is not None:
+        if scene.movables or any(width is not None for width in grip):
             things = ", ".join(item.name for item in scene.movables)
             raise HandrailError(f"ideal robot: expected a scene where nothing can be moved, got {things}")
         super().__init__(model, scene)
@@ -79,9 +79,10 @@ class IdealRobot(Plant):
         self._distances = self._collision.values(self._q[None])[0]
 
     @property
-    def opening(self) -> float:
-        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
-        return 1.0 - self._gate.gripper if self._model.description.end_effector.gripper else 0.0
+    def openings(self) -> tuple[float, ...]:
+        """How far grippers are open, from 0 to 1; 0 of a hand without one."""
+        hands = zip(self._model.description.hands, self._gate.grippers, strict=True)
+        return tuple(1.0 - closed if hand.gripper else 0.0 for hand, closed in hands)
 
     @property
     def contacts(self) -> tuple[str, ...]:

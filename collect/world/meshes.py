@@ -13,7 +13,8 @@ from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import open_regular
 from handrail.controllers.robot.model import RobotModel
-from handrail.controllers.robot.urdf import mesh_files
+from handrail.controllers.robot.parts import Arm
+from handrail.controllers.robot.urdf import mesh_files, urdf_text
 
 _TUBE, _JOINT, _CAP = (0.80, 0.81, 0.83, 1.0), (0.42, 0.44, 0.47, 1.0), (0.32, 0.56, 0.76, 1.0)
 _GRID, _FINE = 2e-3, 10_000  # a mesh of more triangles is drawn with its vertices on a grid [m]
@@ -43,18 +44,23 @@ class PlacedMesh:
 
 def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
     """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file."""
-    description = model.description
-    for path in mesh_files(description.urdf, description.mesh_root):
+    for arm in model.description.arms:
+        yield from _of_arm(model, arm)
+
+
+def _of_arm(model: RobotModel, described: Arm) -> Iterator[PlacedMesh]:
+    for path in mesh_files(described.urdf, described.mesh_root):
         if path.suffix.lower() == ".stl":
             _corners(path)
-    arm = pin.buildModelFromUrdf(str(description.urdf))
+    text, folders = urdf_text(described), [str(described.mesh_root)]
+    arm = pin.buildModelFromXML(text)
     try:
         geometry, seen = (
-            pin.buildGeomFromUrdf(arm, str(description.urdf), kind, package_dirs=[str(description.mesh_root)])
+            pin.buildGeomFromUrdfString(arm, text, kind, package_dirs=folders)
             for kind in (pin.COLLISION, pin.VISUAL)
         )
     except (ValueError, RuntimeError) as error:
-        raise HandrailError(f"URDF {description.urdf}: {message_of(error)}") from error
+        raise HandrailError(f"URDF {described.urdf}: {message_of(error)}") from error
     colours = {item.meshPath: tuple(map(float, item.meshColor)) for item in seen.geometryObjects}
     for item in geometry.geometryObjects:
         path = Path(item.meshPath)

@@ -127,8 +127,8 @@ def _shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
     from handrail.collect.world import geometry
     from handrail.collect.world.robot import build_robot
 
-    hand = replace(model.description.end_effector, gripper=None)
-    bare = RobotModel(replace(model.description, end_effector=hand))
+    hands = tuple(replace(hand, gripper=None) for hand in model.description.hands)
+    bare = RobotModel(replace(model.description, hands=hands))
     spec = build_robot(bare, meshes=False)
     for obstacle in obstacles:
         spec.worldbody.add_geom(

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import closed
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
@@ -43,15 +44,15 @@ class Plant(ABC):
 
     @abstractmethod
     def send(self, command: ArrayLike) -> NDArray[np.floating[Any]]:
-        """Reach velocities linearly over one period, inside the limits; return what was sent, (n + 1,).
+        """Reach velocities linearly over one period, inside the limits; return what was sent, (n + h,).
 
         Args:
-            command: velocities at the end of the period [m/s, rad/s] and gripper (1 closed), (n + 1,); one
-                of another size, or that is not finite, brakes.
+            command: velocities at the end of the period [m/s, rad/s] and grippers (1 closed), (n + h,);
+                one of another size, or that is not finite, brakes.
         """
 
     def stop(self) -> None:
-        """Come to rest as fast as the limits allow, and stay there; the gripper stays as it is."""
+        """Come to rest as fast as the limits allow, and stay there; grippers stay as they are."""
         while self.state().commanded.any():
             self.send(())
 
@@ -74,8 +75,8 @@ class Plant(ABC):
 
     @property
     @abstractmethod
-    def opening(self) -> float:
-        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
+    def openings(self) -> tuple[float, ...]:
+        """How far grippers are open, from 0 to 1; 0 of a hand without one."""
 
     @property
     @abstractmethod
@@ -83,16 +84,17 @@ class Plant(ABC):
         """The forbidden contacts in the last period."""
 
     @property
-    def tool(self) -> Pose:
-        """The pose of the tool point."""
-        return self._model.pose(self.state().q)
+    def tools(self) -> tuple[Pose, ...]:
+        """The poses of the tool points."""
+        q = self.state().q
+        return tuple(self._model.pose(q, hand.named("tool")) for hand in self._model.description.hands)
 
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what a controller has to avoid besides the floor, where it is now, what is held among it."""
         return (*self._scene.obstacles(self.time), *self.held())
 
     def held(self) -> tuple[Obstacle, ...]:
-        """Return what the fingers hold, fixed to the tool as it is now."""
+        """Return what the fingers hold, fixed to its hand's tool as it is now."""
         return ()
 
     def poses(self) -> Mapping[str, Pose]:
@@ -114,44 +116,49 @@ class Gate:
     Args:
         model: of the robot.
         period: from one command to the next [s].
-        gripper: at the beginning, 0 open, 1 closed.
+        grippers: at the beginning, 0 open, 1 closed; all open by default.
         precision: of the numbers that are sent; those of a dataset by default, so that it replays exactly.
 
     Attributes:
         velocity: sent last, (n,) [m/s, rad/s].
-        gripper: sent last.
+        grippers: sent last.
     """
 
     def __init__(
-        self, model: RobotModel, period: float, gripper: float = 0.0, precision: DTypeLike = np.float32
+        self,
+        model: RobotModel,
+        period: float,
+        grippers: tuple[float, ...] = (),
+        precision: DTypeLike = np.float32,
     ) -> None:
         self._limiter = Limiter(model.description)
         self._period, self._precision = period, precision
-        self.velocity, self.gripper = np.zeros(model.size), gripper
+        self.velocity = np.zeros(model.size)
+        self.grippers = grippers or (0.0,) * len(model.description.hands)
 
     def limit(self, command: ArrayLike, q: FloatArray) -> NDArray[np.floating]:
-        """Return what is sent instead of a command, (n + 1,): velocities at the end of a period, and gripper.
+        """Return what is sent instead of a command, (n + h,): velocities at the end of a period, grippers.
 
         A command of another size, or with a number that is not finite, brakes.
 
         Args:
-            command: velocities [m/s, rad/s] and gripper, (n + 1,).
+            command: velocities [m/s, rad/s] and grippers, (n + h,).
             q: where the robot is, (n,).
         """
         said, n = np.asarray(command, dtype=np.float64).ravel(), len(self.velocity)
-        usable = len(said) == n + 1 and math.isfinite(said[n])
+        usable = len(said) == n + len(self.grippers) and all(map(math.isfinite, said[n:]))
         if usable:
-            self.gripper = min(max(float(said[n]), 0.0), 1.0)
+            self.grippers = closed(tuple(said[n:].tolist()), len(self.grippers))
         velocity, _ = self._limiter.limit(self.velocity, said[: n if usable else 0], self._period, q)
-        sent = np.empty(n + 1, self._precision)
-        sent[:n], sent[n] = velocity, self.gripper
-        self.velocity = sent[:-1].astype(np.float64)
+        sent = np.empty(n + len(self.grippers), self._precision)
+        sent[:n], sent[n:] = velocity, self.grippers
+        self.velocity = sent[:n].astype(np.float64)
         return sent
 
-    def state(self) -> tuple[FloatArray, float]:
+    def state(self) -> tuple[FloatArray, tuple[float, ...]]:
         """Return what was sent last, to come back to."""
-        return self.velocity.copy(), self.gripper
+        return self.velocity.copy(), self.grippers
 
-    def restore(self, state: tuple[FloatArray, float]) -> None:
+    def restore(self, state: tuple[FloatArray, tuple[float, ...]]) -> None:
         """Come back to a state."""
-        self.velocity, self.gripper = state[0].copy(), state[1]
+        self.velocity, self.grippers = state[0].copy(), state[1]

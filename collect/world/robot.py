@@ -9,13 +9,13 @@ import pinocchio as pin
 
 from handrail.collect.world import geometry
 from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
-from handrail.collect.world.gripper import FINGERS, add_gripper
+from handrail.collect.world.gripper import add_gripper, fingers
 from handrail.collect.world.meshes import placed_meshes
 from handrail.collect.world.stage import new_stage
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel
-from handrail.controllers.robot.parts import Gripper, PlacedShape, Placement
+from handrail.controllers.robot.parts import EndEffector, Gripper, PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes
 
 BASE_BODY = "planar_base"
@@ -34,38 +34,49 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> M
     spec = new_stage(meshes)
     spec.modelname = model.description.name
     bodies = _add_bodies(spec, model)
-    tool = model.pinocchio.frames[model.frame_id("tool")]
-    at = geometry.pose(tool.placement.translation, tool.placement.rotation)
-    bodies[tool.parentJoint].add_site(name="tool", group=4, **at)
+    for hand in model.description.hands:
+        tool = model.pinocchio.frames[model.frame_id(hand.named("tool"))]
+        at = geometry.pose(tool.placement.translation, tool.placement.rotation)
+        bodies[tool.parentJoint].add_site(name=hand.named("tool"), group=4, **at)
     _add_contact_shapes(model, bodies)
     for camera in model.description.cameras:
         joint, at = _place(model, camera.frame, Placement(np.array(camera.position), camera.axes))
         pose = geometry.pose(at.translation, at.rotation)
         bodies[joint].add_camera(name=camera.name, fovy=camera.fovy, **pose)
-    gripper = model.description.end_effector.gripper
-    jaw = _add_hand(spec, model, gripper, bodies, grips) if gripper else None
+    jaws = [
+        _add_hand(spec, model, hand, hand.gripper, bodies, grips)
+        for hand in model.description.hands
+        if hand.gripper
+    ]
     _add_pairs(spec, model)
     _add_servos(spec, model)
     if meshes:
-        _add_meshes(spec, model, bodies, jaw)
+        _add_meshes(spec, model, bodies, {jaw[0]: jaw[1:] for jaw in jaws if jaw})
     return spec
 
 
 def grasp_geoms(model: RobotModel) -> tuple[str, ...]:
-    """Return the names of the geoms that may touch movable things: palm and fingers."""
-    gripper = model.description.end_effector.gripper
-    if gripper is None:
-        return ()
-    return (*(shape.name for shape in _solid(model) if shape.frame == gripper.frame), *FINGERS)
+    """Return the names of the geoms that may touch movable things: palms and fingers."""
+    found: list[str] = []
+    for hand in model.description.hands:
+        if gripper := hand.gripper:
+            found += [shape.name for shape in _solid(model) if shape.frame == gripper.frame]
+            found += fingers(hand)
+    return tuple(found)
 
 
 def _add_hand(
-    spec: MjSpec, model: RobotModel, gripper: Gripper, bodies: list[MjsBody], grips: bool
+    spec: MjSpec,
+    model: RobotModel,
+    hand: EndEffector,
+    gripper: Gripper,
+    bodies: list[MjsBody],
+    grips: bool,
 ) -> tuple[str, MjsBody, pin.SE3] | None:
-    """Add the gripper; return the URDF's link that turns, its body, and its zero on the hand's body."""
+    """Add a hand's gripper; return the URDF's link that turns, its body, and its zero on the hand's body."""
     joint, frame = _place(model, gripper.frame, gripper.placement)
     if gripper.jaw is None:
-        add_gripper(spec, gripper, bodies[joint], frame, None, grips)
+        add_gripper(spec, hand, bodies[joint], frame, None, grips)
         return None
     carrier, zero = _place(model, gripper.jaw.frame, _AT_FRAME)
     if carrier != joint:
@@ -73,7 +84,7 @@ def _add_hand(
             f"jaw of robot {model.description.name}: expected a frame on the link of {gripper.frame!r}, "
             f"got {gripper.jaw.frame!r}"
         )
-    return gripper.jaw.frame, add_gripper(spec, gripper, bodies[joint], frame, zero, grips), zero
+    return gripper.jaw.frame, add_gripper(spec, hand, bodies[joint], frame, zero, grips), zero
 
 
 def _place(model: RobotModel, frame: str, placement: Placement) -> tuple[int, pin.SE3]:
@@ -158,8 +169,8 @@ def _set_inertia(body: MjsBody, inertia: pin.Inertia) -> None:
 
 def _solid(model: RobotModel) -> list[PlacedShape]:
     """Return the description's collision shapes; real fingers stand in for the shape around them."""
-    gripper = model.description.end_effector.gripper
-    return [shape for shape in model.description.collision if not (gripper and shape.name == gripper.shape)]
+    grippers = [hand.gripper.shape for hand in model.description.hands if hand.gripper]
+    return [shape for shape in model.description.collision if shape.name not in grippers]
 
 
 def _add_shape(model: RobotModel, bodies: list[MjsBody], placed: PlacedShape, **options: object) -> None:
@@ -185,9 +196,9 @@ def _add_contact_shapes(model: RobotModel, bodies: list[MjsBody]) -> None:
 
 def _add_pairs(spec: MjSpec, model: RobotModel) -> None:
     """Let the robot touch itself only where the description says that it can."""
-    gripper = model.description.end_effector.gripper
+    real = {hand.gripper.shape: fingers(hand) for hand in model.description.hands if hand.gripper}
     for pair in model.description.self_pairs:
-        firsts, seconds = (FINGERS if gripper and name == gripper.shape else (name,) for name in pair)
+        firsts, seconds = (real.get(name, (name,)) for name in pair)
         for first in firsts:
             for second in seconds:
                 spec.add_pair(name=f"{first}:{second}", geomname1=first, geomname2=second)
@@ -204,14 +215,15 @@ def _add_servos(spec: MjSpec, model: RobotModel) -> None:
 
 
 def _add_meshes(
-    spec: MjSpec, model: RobotModel, bodies: list[MjsBody], jaw: tuple[str, MjsBody, pin.SE3] | None
+    spec: MjSpec, model: RobotModel, bodies: list[MjsBody], jaws: dict[str, tuple[MjsBody, pin.SE3]]
 ) -> None:
     """Draw the arm's links by their meshes, and the shapes that the description adds to look at."""
     ghost = {**geometry.UNTOUCHED, "group": geometry.VISIBLE_GROUP}
     for mesh in placed_meshes(model):
         body, at = bodies[mesh.joint], mesh.placement
-        if jaw is not None and mesh.link == jaw[0]:
-            body, at = jaw[1], jaw[2].actInv(at)
+        if mesh.link in jaws:
+            body, zero = jaws[mesh.link]
+            at = zero.actInv(at)
         for index, piece in enumerate(mesh.pieces):
             name = f"{mesh.name}_{index}"
             spec.add_mesh(

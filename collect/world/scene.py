@@ -139,17 +139,18 @@ class SceneObject(FrozenArrays):
         """What is drawn and touched."""
         return self.parts or (Part(self.shape, np.zeros(3)),)
 
-    def carried(self, tool: Pose, now: Pose) -> Obstacle:
+    def carried(self, tool: Pose, now: Pose, frame: str = "tool") -> Obstacle:
         """Return it as the controller sees it while the hand holds it: the box around it, fixed to the tool.
 
         Args:
             tool: pose of the tool point.
             now: its own pose.
+            frame: name of the tool's.
         """
         shape, centre = self._box
         inverse = tool.rotation.T
         position = inverse @ (now.position + now.rotation @ centre - tool.position)
-        return Obstacle(self.name, shape, position, inverse @ now.rotation, frame="tool")
+        return Obstacle(self.name, shape, position, inverse @ now.rotation, frame=frame)
 
     def obstacle(self, time: float = 0.0) -> Obstacle:
         """Return it as the controller sees it at a time of the episode [s]."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.world.contacts import Contacts
 from handrail.collect.world.gl import MjSpec, mujoco
-from handrail.collect.world.gripper import FINGERS
+from handrail.collect.world.gripper import FingersServo, fingers
 from handrail.collect.world.looks import Looks
 from handrail.collect.world.plant import Gate, Plant
 from handrail.collect.world.robot import BASE_BODY, build_robot, grasp_geoms
@@ -35,8 +35,9 @@ class Simulation(Plant):
         q: where it begins, (n,).
         step: of the control [s].
         meshes: whether to draw the robot as it looks.
-        grip: width of what the gripper is closed around at the beginning [m]; None where it is open.
-        grips: whether the gripper can move; else it stays open.
+        grip: widths of what the hands' grippers are closed around at the beginning [m]; None of one that is
+            open, as are those that nothing is said of.
+        grips: whether grippers can move; else they stay open.
         timestep: longest step of the integrator [s].
         gate: what every command passes; by default one that sends a dataset's numbers.
 
@@ -52,17 +53,18 @@ class Simulation(Plant):
         q: FloatArray,
         step: float,
         meshes: bool = False,
-        grip: float | None = None,
+        grip: tuple[float | None, ...] = (),
         grips: bool = True,
         timestep: float = _TIMESTEP,
         gate: Gate | None = None,
     ) -> None:
-        if grip is not None and not grips:
+        hands = model.description.hands
+        held = (*grip, *[None] * len(hands))[: len(hands)]
+        if any(width is not None for width in held) and not grips:
             raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
         super().__init__(model, scene)
         self._step = step
-        self._gripper = model.description.end_effector.gripper if grips else None
-        self._gate = gate or Gate(model, step, float(grip is not None))
+        self._gate = gate or Gate(model, step, tuple(float(width is not None) for width in held))
         substeps = math.ceil(step / timestep - 1e-9)
         self._shares = np.arange(1, substeps + 1) / substeps
         try:
@@ -74,30 +76,25 @@ class Simulation(Plant):
             raise HandrailError(f"{where}: MuJoCo says: {message_of(error)}") from error
         self.data = mujoco.MjData(self.mujoco_model)
         self._held_at = -math.inf  # what was held then is known
-        self._contacts = Contacts(self.mujoco_model, scene, grasp_geoms(model), self._gripper is not None)
+        self._servos = [FingersServo.of(self.mujoco_model, hand) if grips else None for hand in hands]
+        pads = [fingers(hand) if servo else () for hand, servo in zip(hands, self._servos, strict=True)]
+        self._contacts = Contacts(self.mujoco_model, scene, grasp_geoms(model), pads)
         self._find()
         self.data.qpos[self._q_index] = q
-        if self._gripper:  # open, or closed around something
-            apart = self._travel if grip is None else grip * (self._travel / self._gripper.stroke)
-            self.data.qpos[self._finger_index] = apart / len(self._finger_index)
-            self.data.ctrl[self._gripper_servo] = self._gripper_target(float(grip is not None))
+        for servo, width in zip(self._servos, held, strict=True):
+            if servo:
+                servo.begin(self.data, width)
         mujoco.mj_forward(self.mujoco_model, self.data)
         self._standing = {item.name: self._pose(item.name) for item in scene.objects}
         self._moving = [item.name for item in scene.objects if item.movable or item.patrol]
 
     def _find(self) -> None:
         """Find where the robot and what moves by itself are in MuJoCo's arrays."""
-        compiled, names, gripper = self.mujoco_model, self._model.joints, self._gripper
+        compiled, names = self.mujoco_model, self._model.joints
         self._q_index = _span([compiled.joint(name).qposadr[0] for name in names])
         self._v_index = _span([compiled.joint(name).dofadr[0] for name in names])
         self._servo_index = np.array([compiled.actuator(name).id for name in names])
-        self._tool = compiled.site("tool").id
-        if gripper:
-            fingers = FINGERS if gripper.jaw is None else FINGERS[:1]
-            self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in fingers])
-            self._gripper_servo = compiled.actuator("gripper").id
-            self._travel = gripper.travel
-            self._reach = gripper.pace * self._step * self._shares  # of the fingers in a step
+        self._tools = [compiled.site(hand.named("tool")).id for hand in self._model.description.hands]
         moving = ((item.name, item.patrol) for item in self._scene.objects if item.patrol)
         self._patrols = [(int(compiled.body(name).mocapid[0]), patrol) for name, patrol in moving]
         self._bodies = {item.name: int(compiled.body(item.name).id) for item in self._scene.objects}
@@ -127,10 +124,10 @@ class Simulation(Plant):
         mujoco.mj_camlight(self.mujoco_model, self.data)
 
     def send(self, command: ArrayLike) -> NDArray[np.floating]:
-        """Reach velocities linearly over one step, the gripper at its own speed; return what was sent.
+        """Reach velocities linearly over one step, grippers at their own speed; return what was sent.
 
         Args:
-            command: velocities at the end of the step [m/s, rad/s] and gripper, (n + 1,).
+            command: velocities at the end of the step [m/s, rad/s] and grippers, (n + h,).
         """
         contacts, model, data = self._contacts, self.mujoco_model, self.data
         contacts.clear()
@@ -139,10 +136,11 @@ class Simulation(Plant):
         ctrl, shares = data.ctrl, self._shares[:, None]
         ramp = np.empty((len(shares), len(ctrl)))
         ramp[:, self._servo_index] = (1.0 - shares) * before + shares * self._gate.velocity
-        if self._gripper:
-            now, reach = ctrl[self._gripper_servo], self._reach
-            way = self._gripper_target(float(sent[-1])) - now
-            ramp[:, self._gripper_servo] = now + np.minimum(np.maximum(way, -reach), reach)
+        for servo, closed in zip(self._servos, sent[-len(self._servos) :].tolist(), strict=True):
+            if servo:
+                now, reach = ctrl[servo.actuator], servo.gripper.pace * self._step * self._shares
+                way = servo.target(closed) - now
+                ramp[:, servo.actuator] = now + np.minimum(np.maximum(way, -reach), reach)
         for ctrl[:] in ramp:
             if self._patrols:
                 self._move_obstacles()
@@ -175,19 +173,15 @@ class Simulation(Plant):
 
         Args:
             base: on the base's centre of mass, in the world, (3,) [N].
-            hand: at the tool point, in the world, (3,) [N].
+            hand: at every tool point, in the world, (3,) [N].
         """
         data = self.data
-        carrier = self.mujoco_model.site_bodyid[self._tool]
-        lever = data.site_xpos[self._tool] - data.xipos[carrier]
         data.xfrc_applied[:] = 0.0
         data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
-        data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
-
-    def _gripper_target(self, gripper: float) -> float:
-        """Return the opening that the gripper's servo is sent to [m, rad]; closed is a little beyond it."""
-        assert self._gripper
-        return (1.0 - gripper) * self._travel - self._gripper.beyond * gripper
+        for tool in self._tools:
+            carrier = self.mujoco_model.site_bodyid[tool]
+            lever = data.site_xpos[tool] - data.xipos[carrier]
+            data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
     def _move_obstacles(self) -> None:
         """Put what moves by itself where it is now."""
@@ -205,16 +199,17 @@ class Simulation(Plant):
         return self.data.time
 
     @property
-    def tool(self) -> Pose:
-        """The pose of the tool point."""
-        return _pose(self.data.site_xpos[self._tool], self.data.site_xmat[self._tool])
+    def tools(self) -> tuple[Pose, ...]:
+        """The poses of the tool points."""
+        return tuple(_pose(self.data.site_xpos[tool], self.data.site_xmat[tool]) for tool in self._tools)
 
     @property
-    def opening(self) -> float:
-        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
-        if self._gripper is None:
-            return float(self._model.description.end_effector.gripper is not None)
-        return min(max(float(self.data.qpos[self._finger_index].sum() / self._travel), 0.0), 1.0)
+    def openings(self) -> tuple[float, ...]:
+        """How far grippers are open, from 0 to 1; 0 of a hand without one."""
+        hands = zip(self._model.description.hands, self._servos, strict=True)
+        return tuple(
+            servo.opening(self.data) if servo else float(hand.gripper is not None) for hand, servo in hands
+        )
 
     @property
     def is_stable(self) -> bool:
@@ -233,8 +228,11 @@ class Simulation(Plant):
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""
         if self._held_at != self.data.time:
-            names = self._contacts.held(self.data)
-            self._held = tuple(self._scene.find(name).carried(self.tool, self._pose(name)) for name in names)
+            found, hands, tools = self._contacts.held(self.data), self._model.description.hands, self.tools
+            self._held = tuple(
+                self._scene.find(name).carried(tools[hand], self._pose(name), hands[hand].named("tool"))
+                for name, hand in found.items()
+            )
             self._held_at = self.data.time
         return self._held
 

@@ -25,7 +25,9 @@ class Start(FrozenArrays):
     scene: Scene  # everything around the robot
     q: FloatArray  # where the robot starts, (n,)
     goal: Pose | None = None  # of the tool, if there is one
-    grip: float | None = None  # width of what the gripper already holds [m]; None begins with it open
+    grip: tuple[float | None, ...] = ()
+    """Widths of what grippers already hold [m], of the hand that does it first; open where None is said, or
+    nothing."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,24 @@ class TaskState:
     """The truth of a moment, for judging an outcome and for scripted operators."""
 
     time: float  # since the episode began [s]
-    tool: Pose  # of the tool point
-    opening: float  # of the gripper, 0 closed to 1 open
+    tools: tuple[Pose, ...]  # of each hand's tool point
+    openings: tuple[float, ...]  # of each hand's gripper, 0 closed to 1 open
     start: Start  # how the episode began: scene with the objects' shapes, goal
     poses: Mapping[str, Pose]  # of every object of the scene, by name
     still: frozenset[str] = frozenset()  # names of the movable objects that are at rest
     stable: bool = True  # whether the physics went well so far
     scale: float = 1.0  # of the robot's world
+    hand: int = 0  # number of the hand that does it
+
+    @property
+    def tool(self) -> Pose:
+        """The pose of the tool point of the hand that does the task."""
+        return self.tools[self.hand]
+
+    @property
+    def opening(self) -> float:
+        """How far that hand's gripper is open."""
+        return self.openings[self.hand]
 
     @property
     def goal(self) -> Pose | None:

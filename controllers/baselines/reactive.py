@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent, closed
 from handrail.controllers.interface.validation import InputHistory, InputValidator
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -66,10 +66,10 @@ class ReactiveController:
         self.reset()
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
-        """Forget when inputs came, and the gripper; take the obstacles whose distance is reported."""
+        """Forget when inputs came, and grippers; take the obstacles whose distance is reported."""
         self.surroundings = Surroundings.of(CollisionModel(self._model, obstacles), *self._margins)
         self._inputs = InputHistory()
-        self._gripper = 0.0
+        self._grippers = (0.0,) * len(self.channels.hands)
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""
@@ -87,7 +87,7 @@ class ReactiveController:
         previous = state.sent(self._model.description.limits)
         target = np.zeros(self._model.size)
         if status is Status.OK:
-            self._gripper = min(max(intent.gripper, 0.0), 1.0)
+            self._grippers = closed(intent.grippers, len(self._grippers))
             try:
                 target = self._ask(state, intent, previous)
             except HandrailError:
@@ -100,7 +100,7 @@ class ReactiveController:
         solve_time = perf_counter() - start
         near = (np.inf, np.inf) if q is None else self._smallest(q)
         diagnostics = Diagnostics(status, solve_time, self.slack, *near)
-        return Command(velocities, self._period, gripper=self._gripper, diagnostics=diagnostics)
+        return Command(velocities, self._period, grippers=self._grippers, diagnostics=diagnostics)
 
     def _smallest(self, q: FloatArray) -> tuple[float, float]:
         """Return the smallest distances now [m]; margins of what is held are seen by the way."""

@@ -27,7 +27,7 @@ def split_controller(model: RobotModel, period: float = 0.05) -> ReactiveControl
 
     def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         base = base_velocity(intent, channels, state.q)
-        if not intent.mask[channels.tool_slice].any():
+        if not intent.mask[channels.hand_slice()].any():
             return np.concatenate([base, np.zeros(model.size - len(base))])
         twist = tool_twist(intent, channels, model.pose(state.q))
         return arm.velocity(state.q, previous, base, twist, period)

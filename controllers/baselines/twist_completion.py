@@ -112,7 +112,7 @@ def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArr
     return twist if intent.frames.base == "world" else turned(twist, q[2])
 
 
-def tool_twist(intent: Intent, channels: Channels, tool: Pose) -> FloatArray:
+def tool_twist(intent: Intent, channels: Channels, tool: Pose, hand: int = 0) -> FloatArray:
     """Return the commanded twist (v, ω), world-aligned at the tool point of the robot, (6,) [m/s, rad/s].
 
     A twist in the tool frame is turned by R; one for a point p of the tool loses `ω × R p`.
@@ -121,8 +121,9 @@ def tool_twist(intent: Intent, channels: Channels, tool: Pose) -> FloatArray:
         intent: whose frames say what its twist means.
         channels: of the robot.
         tool: its pose.
+        hand: whose it is.
     """
-    twist = np.where(intent.mask, intent.values, 0.0)[channels.tool_slice]
+    twist = np.where(intent.mask, intent.values, 0.0)[channels.hand_slice(hand)]
     if intent.frames.tool == "tool":
         twist = np.concatenate([tool.rotation @ twist[:3], tool.rotation @ twist[3:]])
     if intent.frames.point.any():

@@ -37,7 +37,9 @@ def unprotected_controller(model: RobotModel, period: float = 0.05) -> ReactiveC
 def _world_values(model: RobotModel, channels: Channels, state: State, intent: Intent) -> FloatArray:
     """Return the values in the frames of the channels' matrix, (m,)."""
     values = intent.values.copy()
-    values[channels.tool_slice] = tool_twist(intent, channels, model.pose(state.q))
+    for hand, each in enumerate(model.description.hands):
+        tool = model.pose(state.q, each.named("tool"))
+        values[channels.hand_slice(hand)] = tool_twist(intent, channels, tool, hand)
     if channels.base and intent.frames.base == "world":
         values[channels.base_slice] = turned(base_velocity(intent, channels, state.q), -state.q[2])
     return values

@@ -1,7 +1,7 @@
 """What the operator asks for: values on channels, and a mask of those that are commanded."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -43,7 +43,8 @@ class Intent:
     """One number a channel, in the order of `Channels.names`, (m,); where the mask is false they mean
     nothing."""
     mask: BoolArray  # which channels the operator owns now, (m,)
-    gripper: float = 0.0  # 0 open, 1 closed
+    grippers: tuple[float, ...] = (0.0,)
+    """How far each hand's is to be closed, 0 open to 1; a single number is of all of them."""
     mode: str = ""  # name of the teleop mode that made it
     time: float = 0.0
     """When the operator asked [s], on the clock of the state; every new intent has a later one."""
@@ -54,20 +55,34 @@ class Intent:
         """Copy the arrays and make them read-only."""
         object.__setattr__(self, "values", frozen(self.values, what="values of an intent"))
         object.__setattr__(self, "mask", frozen(self.mask, bool, "mask of an intent"))
-        for name in ("gripper", "time"):
-            object.__setattr__(self, name, real(getattr(self, name), f"{name} of an intent"))
+        object.__setattr__(self, "time", real(self.time, "time of an intent"))
+        grippers = tuple(real(each, "gripper of an intent") for each in self.grippers)
+        object.__setattr__(self, "grippers", grippers)
 
     @classmethod
     def idle(cls, channels: Channels, time: float = 0.0) -> "Intent":
         """Return the intent of an operator who touches nothing."""
         return cls(np.zeros(channels.size), np.zeros(channels.size, dtype=bool), time=time)
 
+    def of_hands(self, hands: int) -> "Intent":
+        """Return the intent with a number for each gripper; NaN, which brakes, where some are missing."""
+        if len(self.grippers) == hands:
+            return self
+        same = self.grippers[0] if len(self.grippers) == 1 else math.nan
+        return replace(self, grippers=(same,) * hands)
+
     @property
     def is_finite(self) -> bool:
-        """Whether every commanded value, the gripper and the time are numbers, and each value has a mask."""
-        scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
+        """Whether every commanded value, grippers and the time are numbers, and each value has a mask."""
+        scalars = all(map(math.isfinite, (*self.grippers, self.time)))
         scalars = scalars and self.values.ndim == 1 and self.values.shape == self.mask.shape
         return scalars and (are_finite(self.values) or bool(np.all(np.isfinite(self.values) | ~self.mask)))
+
+
+def closed(grippers: tuple[float, ...], hands: int) -> tuple[float, ...]:
+    """Return how far each of so many grippers is closed, from 0 to 1."""
+    within = tuple(min(max(each, 0.0), 1.0) for each in grippers)
+    return within * hands if len(within) == 1 else within
 
 
 def decided_gripper(number: float) -> float:

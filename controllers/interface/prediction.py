@@ -67,7 +67,7 @@ class Extrapolated:
 class Bounded:
     """Hold the command until the hand would have gone some way, then let it rest.
 
-    `û(t) = u` while `t ≤ min(d / ‖v‖, φ / ‖ω‖)`, then zero on the tool's channels; the first time ahead
+    `û(t) = u` while `t ≤ min(d / ‖v‖, φ / ‖ω‖)`, then zero on the hand's channels; the first time ahead
     always holds. The bound is a length, not a time: a fast command over a long horizon would else be
     predicted to lead where the robot cannot go, and the plan would slow down for what will not happen.
 
@@ -78,17 +78,18 @@ class Bounded:
     """
 
     def __init__(self, channels: Channels, distance: float = 0.4, angle: float = 1.5) -> None:
-        self._tool = channels.tool_slice.start
+        hands = [channels.hand_slice(hand) for hand in range(len(channels.hands))]
+        self._twists = [*hands, *([channels.pair_slice] if channels.pair else [])]
         self._distance, self._angle = distance, angle
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        tool = slice(self._tool, self._tool + 6)
-        twist = np.where(intent.mask, intent.values, 0.0)[tool]
-        speed, rate = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
-        pace = max(speed / self._distance, rate / self._angle)
         predicted = np.tile(intent.values, (len(times), 1))
-        predicted[(times * pace > 1.0) & (times > times[0]), tool] = 0.0
+        for where in self._twists:
+            twist = np.where(intent.mask, intent.values, 0.0)[where]
+            speed, rate = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:6])
+            pace = max(speed / self._distance, rate / self._angle)
+            predicted[(times * pace > 1.0) & (times > times[0]), where] = 0.0
         return predicted
 
 

@@ -69,4 +69,6 @@ class InputValidator:
         size = self.channels.size
         if intent.values.shape != (size,) or intent.mask.shape != (size,):
             return False
+        if len(intent.grippers) not in (1, len(self.channels.hands)):
+            return False
         return intent.is_finite and intent.frames.are_known and intent.time <= state.time + _LEAD

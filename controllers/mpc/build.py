@@ -20,9 +20,8 @@ from handrail.controllers.objectives.tracking import tracking
 from handrail.controllers.ocp.problem import Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import RobotModel, joints_of
 
-_TRANSLATIONS = ("base.vx", "base.vy", "ee.vx", "ee.vy", "ee.vz", "joint.x", "joint.y")
 _MASKS = 1024  # whose weights are remembered
 
 
@@ -42,9 +41,13 @@ class ProblemBuilder:
         self._times = settings.dt * np.arange(1, settings.horizon + 1)
         self._tolerance = settings.velocity_tolerance * self._limits.velocity
         self._reference = np.tile(residuals.reference, (settings.horizon, 1))
-        velocity, tool = self._limits.velocity, [settings.largest_speed] * 3 + [settings.largest_rate] * 3
+        base, hands = len(self._channels.base), self._channels.names[self._channels.hands_slice]
+        fastest = np.where(_lengths(model, self._channels), settings.largest_speed, settings.largest_rate)
+        velocity, fastest = self._limits.velocity, fastest[base : base + len(hands)]
         # what a command of each channel is cut to, (m,): nothing faster is possible, or wise
-        self._largest = np.concatenate([velocity[: len(self._channels.base)], tool, velocity])
+        self._largest = np.concatenate([velocity[:base], fastest, velocity])
+        self._home, start = model.description.home, self._channels.size + 2 * model.size
+        self._posture = slice(start, start + model.size)
         self._weights_of = lru_cache(_MASKS)(self._weights)
 
     def build(self, loop: LoopState, state: State, intent: Intent) -> Problem:
@@ -57,6 +60,8 @@ class ProblemBuilder:
             raise HandrailError(f"prediction: expected values of shape {expected}, got {predicted.shape}")
         reference = _asked(self._reference, predicted, intent.mask, self._largest)
         parameters[self._residuals.parameter_slice("tracking")] = intent.frames.parameters
+        if loop.rest is not None:
+            reference[:, self._posture] = np.where(np.isnan(loop.rest), self._home, loop.rest)
         sent = state.sent(self._limits)
         return Problem(
             q=state.expected,
@@ -93,8 +98,9 @@ def built_in_objectives(
     arm = np.arange(model.size) >= base
     velocity = np.where(arm, settings.arm_velocity, settings.base_velocity)
     commanded = np.full(channels.size, settings.tracking)
-    commanded[channels.tool_slice][3:] = settings.turn_tracking
-    lengths = np.array([name in _TRANSLATIONS for name in channels.names])
+    lengths = _lengths(model, channels)
+    hands = channels.hands_slice
+    commanded[hands] = np.where(lengths[hands], settings.tracking, settings.turn_tracking)
     shifts = lengths[channels.joint_slice]
     return (
         tracking(channels, _per_length(commanded, lengths, settings)),
@@ -104,6 +110,12 @@ def built_in_objectives(
         ),
         posture(channels, model.description.home, settings.posture * arm),
     )
+
+
+def _lengths(model: RobotModel, channels: Channels) -> BoolArray:
+    """Return which channels are speeds of a translation, (m,)."""
+    twists = [name.split(".")[1][0] == "v" for name in channels.names[: channels.joint_slice.start]]
+    return np.array([*twists, *(joint.prismatic for joint in joints_of(model))])
 
 
 def _per_length(weights: FloatArray, lengths: BoolArray, settings: MpcSettings) -> FloatArray:

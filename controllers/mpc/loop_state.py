@@ -7,12 +7,14 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.surroundings import Surroundings
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Prediction, after
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.interface.validation import InputHistory
+from handrail.controllers.objectives.ownership import steered_joints
 from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
@@ -32,6 +34,9 @@ class LoopState(NamedTuple):
     period: float = 0.0  # time from the command before it [s]
     plan: Plan | None = None  # of the last update; None where the robot follows something else
     planned: float = 0.0  # how long the command follows its plan [s]
+    rest: FloatArray | None = None
+    """Where joints stay that move no steered hand, (n,); NaN of the others. None of a robot with one hand."""
+    paired: bool = False  # whether two hands are being steered as a pair
     active: IntArray = NOTHING_ACTIVE
     """Names of the rows that were active in the last problem among these pairs."""
 
@@ -41,9 +46,14 @@ class LoopState(NamedTuple):
         same = around.collision is self.surroundings.collision
         return self._replace(surroundings=around, active=self.active if same else NOTHING_ACTIVE)
 
-    def facing(self, state: State, intent: Intent) -> "LoopState":
+    def facing(self, state: State, intent: Intent, channels: Channels) -> "LoopState":
         """Return the state in which the problem of a robot's state and an intent is built."""
         around, predict = self.surroundings.known_at(state.expected), after(self.predict, intent)
+        if len(channels.hands) > 1:
+            before = np.full(len(state.q), np.nan) if self.rest is None else self.rest
+            stays = np.where(np.isnan(before), state.expected, before)
+            rest = np.where(steered_joints(channels, intent.mask), np.nan, stays)
+            return self._replace(surroundings=around, predict=predict, rest=rest)
         if around is self.surroundings and predict is self.predict:
             return self
         return self._replace(surroundings=around, predict=predict)

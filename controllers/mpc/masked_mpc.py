@@ -16,6 +16,7 @@ from handrail.controllers.mpc.build import ProblemBuilder, built_in_objectives
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.mpc.supervision import Supervisor
 from handrail.controllers.objectives.objective import Objective
+from handrail.controllers.objectives.together import TOGETHER, together_parameters
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.ocp.settings import MpcSettings
@@ -60,7 +61,7 @@ class MaskedMpc:
         self.solver = RealTimeSolver(self.residuals, horizon, model.size, self.settings.dt)
         self._builder = ProblemBuilder(model, self.settings, self.residuals)
         self._validator = InputValidator(self.channels, self.settings.intent_timeout)
-        self._supervisor = Supervisor(Limiter(model.description), self.settings)
+        self._supervisor = Supervisor(Limiter(model.description), self.settings, len(self.channels.hands))
         self._predict = predict
         self.reset()
 
@@ -92,7 +93,7 @@ class MaskedMpc:
         status, inputs = self._validator.check(state, intent, makes_sense, self.loop.inputs)
         loop = self.loop._replace(inputs=inputs)
         if status is Status.OK:
-            loop = loop.facing(state, intent)
+            loop = self._facing(loop, state, intent)
             plan, active = self.solve(self._builder.build(loop, state, intent), loop, state)
             loop = loop._replace(active=active)
             status = Status.SOLVER_FAILED if plan is None else Status.OK
@@ -101,7 +102,20 @@ class MaskedMpc:
 
     def build_problem(self, state: State, intent: Intent) -> Problem:
         """Return the optimal control problem of a state and an intent; a question that changes nothing."""
-        return self._builder.build(self.loop.facing(state, intent), state, intent)
+        return self._builder.build(self._facing(self.loop, state, intent), state, intent)
+
+    def _facing(self, loop: LoopState, state: State, intent: Intent) -> LoopState:
+        """Return the loop's state in which a problem is built; a pair of hands is kept as it begins."""
+        if not self.channels.pair:
+            return loop.facing(state, intent, self.channels)
+        steered = bool(intent.mask[self.channels.pair_slice].any())
+        if steered and not loop.paired and TOGETHER in self.residuals.names:
+            parameters = loop.parameters.copy()
+            parameters[self.residuals.parameter_slice(TOGETHER)] = together_parameters(
+                self.model, state.expected
+            )
+            loop = loop._replace(parameters=parameters)
+        return loop.facing(state, intent, self.channels)._replace(paired=steered)
 
     def solve(self, problem: Problem, loop: LoopState, state: State) -> tuple[Plan | None, IntArray]:
         """Return the plan, beginning with what is being sent, and the active rows; None where solving fails.

@@ -9,7 +9,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import Intent, closed
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.ocp.problem import Plan
@@ -27,6 +27,7 @@ class Supervisor:
 
     limiter: Limiter  # knows the limits and the full stop
     settings: MpcSettings  # margins, horizon
+    hands: int = 1  # of the robot
 
     def supervise(
         self, loop: LoopState, state: State, intent: Intent, plan: Plan | None, status: Status, start: float
@@ -49,9 +50,9 @@ class Supervisor:
         if plan is not None and not planned:
             status = Status.BACKUP
         diagnostics = _diagnostics(plan, status, start, distances, loop.surroundings)
-        gripper = _gripper(loop, intent, status)
+        grippers = _grippers(loop, intent, status, self.hands)
         planned_path = Trajectory(plan.v, self.settings.dt) if plan is not None and planned else None
-        command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics, planned_path)
+        command = Command(motion.velocities, motion.dt, motion.elapsed, grippers, diagnostics, planned_path)
         return command, loop.following(
             command, state.time, self.settings.dt, plan if planned else None, way.planned
         )
@@ -93,11 +94,11 @@ class Supervisor:
         return loop.surroundings.collision.values(state.expected[None, :])[0] if known else None
 
 
-def _gripper(loop: LoopState, intent: Intent, status: Status) -> float:
-    """Return how far the gripper is closed: as asked; as before where nobody is listened to."""
+def _grippers(loop: LoopState, intent: Intent, status: Status, hands: int) -> tuple[float, ...]:
+    """Return how far grippers are closed: as asked; as before where nobody is listened to."""
     if status in _UNHEARD:
-        return 0.0 if loop.command is None else loop.command.gripper
-    return min(max(intent.gripper, 0.0), 1.0)
+        return (0.0,) * hands if loop.command is None else loop.command.grippers
+    return closed(intent.grippers, hands)
 
 
 def _diagnostics(

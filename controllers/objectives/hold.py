@@ -13,8 +13,10 @@ _TINY = 1e-9
 _REACH = 0.05  # distance [m] and angle [rad] from which the pull grows no more
 
 
-def end_effector_hold(channels: Channels, position: float = 5.0, orientation: float = 0.0) -> Objective:
-    """Hold the hand at a pose: `‖p - p*‖²` and `‖2 sin(θ/2) a‖²` of the turn (a, θ) from R* to R.
+def end_effector_hold(
+    channels: Channels, position: float = 5.0, orientation: float = 0.0, hand: int = 0
+) -> Objective:
+    """Hold a hand at a pose: `‖p - p*‖²` and `‖2 sin(θ/2) a‖²` of the turn (a, θ) from R* to R.
 
     Far from the pose the pull is bounded. Parameters: `hold_parameters(pose)`. The rows of
     the position rest while the operator owns a linear channel of the hand, those of the orientation while
@@ -24,24 +26,26 @@ def end_effector_hold(channels: Channels, position: float = 5.0, orientation: fl
         channels: of the robot.
         position: weight of the position [1/m²].
         orientation: weight of the orientation [1/rad²]; 0 holds the point only.
+        hand: which of the hands.
     """
+    name = channels.hands[hand][0].split(".")[0]
 
     def residual(stage: Stage, p: ca.SX) -> ca.SX:
-        pose = stage.pose()
-        parts = [_bounded_pull(pose.position - p[:3])]
+        pose = stage.tool(hand)
+        parts = [bounded_pull(pose.position - p[:3])]
         if orientation:
-            parts.append(_bounded_pull(_turn(ca.reshape(p[3:12], 3, 3).T, pose.rotation)))
+            parts.append(bounded_pull(turn_between(ca.reshape(p[3:12], 3, 3).T, pose.rotation)))
         return ca.vertcat(*parts)
 
     def weights(mask: BoolArray) -> FloatArray:
-        tool, free = mask[channels.tool_slice], leaves_freedom(channels, mask)
+        tool, free = channels.twist_mask(mask, hand), leaves_freedom(channels, mask)
         parts = [np.full(3, position * (free and not tool[:3].any()))]
         if orientation:
             parts.append(np.full(3, orientation * (free and not tool[3:].any())))
         return np.concatenate(parts)
 
     return Objective(
-        name="hold",
+        name="hold" if len(channels.hands) == 1 else f"{name}.hold",
         residual=residual,
         reference=np.zeros(6 if orientation else 3),
         weights=weights,
@@ -54,14 +58,14 @@ def hold_parameters(pose: Pose) -> FloatArray:
     return np.concatenate([pose.position, np.asarray(pose.rotation).ravel()])
 
 
-def _turn(goal: ca.SX, rotation: ca.SX) -> ca.SX:
+def turn_between(goal: ca.SX, rotation: ca.SX) -> ca.SX:
     """Return `2 sin(θ/2) a` of the turn `R R*ᵀ`, (3, 1): twice the vector part of its quaternion."""
     turn = rotation @ goal.T
     twice = ca.vertcat(turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
     return twice / ca.sqrt(1.0 + ca.trace(turn) + _TINY)
 
 
-def _bounded_pull(error: ca.SX) -> ca.SX:
+def bounded_pull(error: ca.SX) -> ca.SX:
     """Return e scaled to `‖r‖² = 2 δ² (√(1 + ‖e‖²/δ²) - 1)`, the pseudo-Huber loss, δ = reach.
 
     Near the goal r = e; far from it the cost grows linearly, so that its pull, at most weight times δ,

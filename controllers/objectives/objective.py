@@ -20,9 +20,13 @@ class Stage:
     v: ca.SX  # velocity after it, (n, 1)
     u: ca.SX  # acceleration during it, (n, 1)
 
-    def pose(self, frame: str = "tool") -> SymbolicPose:
-        """Return pose and Jacobian of a frame as expressions of q."""
+    def pose(self, frame: str = "") -> SymbolicPose:
+        """Return pose and Jacobian of a frame as expressions of q; of the first hand's tool by default."""
         return symbolic_pose(self.model, self.q, frame)
+
+    def tool(self, hand: int = 0) -> SymbolicPose:
+        """Return the same of a hand's tool."""
+        return self.pose(self.model.description.hands[hand].named("tool"))
 
 
 @dataclass(frozen=True)

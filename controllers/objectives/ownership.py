@@ -16,13 +16,30 @@ def commanded_joints(channels: Channels, mask: BoolArray) -> BoolArray:
 
 
 def leaves_freedom(channels: Channels, mask: BoolArray) -> bool:
-    """Whether fewer velocities are commanded than the robot has joints."""
-    commanded = np.count_nonzero(commanded_joints(channels, mask)) + np.count_nonzero(
-        mask[channels.tool_slice]
-    )
-    return bool(commanded < len(channels.joints))
+    """Whether fewer velocities are commanded than there are joints that move a hand.
+
+    Each row of a twist takes a joint that nobody commands: of the hand's own arm first, then of those that
+    move another hand too.
+    """
+    hands = range(len(channels.hands))
+    left = [channels.moving(hand) & ~commanded_joints(channels, mask) for hand in hands]
+    count = np.sum(left, axis=0)
+    own = [np.count_nonzero(each & (count == 1)) for each in left]
+    rows = [np.count_nonzero(mask[channels.hand_slice(hand)]) for hand in hands]
+    beyond = sum(max(each - arm, 0) for each, arm in zip(rows, own, strict=True))
+    taken = sum(map(min, rows, own)) + min(beyond, np.count_nonzero(count > 1))
+    return bool(taken + np.count_nonzero(mask[channels.pair_slice]) < np.count_nonzero(count))
 
 
-def leaves_hand(channels: Channels, mask: BoolArray) -> bool:
-    """Whether the hand's pose is not fully commanded: not all of its twist, nor all joints."""
-    return leaves_freedom(channels, mask) and not bool(mask[channels.tool_slice].all())
+def leaves_hand(channels: Channels, mask: BoolArray, hand: int = 0) -> bool:
+    """Whether a hand's pose is not fully commanded: not all of its twist, nor all joints."""
+    return leaves_freedom(channels, mask) and not bool(channels.twist_mask(mask, hand).all())
+
+
+def steered_joints(channels: Channels, mask: BoolArray) -> BoolArray:
+    """Return which joints move a hand of which an axis is commanded, (n,)."""
+    found = np.zeros(len(channels.joints), dtype=bool)
+    for hand in range(len(channels.hands)):
+        if channels.twist_mask(mask, hand).any() or mask[channels.pair_slice].any():
+            found |= channels.moving(hand)
+    return found

@@ -30,10 +30,10 @@ def acceleration_regularisation(weights: FloatArray) -> Objective:
 
 
 def posture(channels: Channels, reference: FloatArray, weights: FloatArray) -> Objective:
-    """Draw the joints that nobody commands to a posture while the tool is steered, `‖q - q_ref‖²`, (n,)."""
+    """Draw the joints that nobody commands to a posture while a hand is steered, `‖q - q_ref‖²`, (n,)."""
 
     def masked(mask: BoolArray) -> FloatArray:
-        steered = bool(np.any(mask[channels.tool_slice]))
+        steered = bool(np.any(mask[channels.hands_slice]))
         return weights * ~commanded_joints(channels, mask) * steered
 
     return Objective("posture", lambda stage, p: stage.q, np.array(reference), masked)
@@ -60,7 +60,11 @@ def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> 
     half = 0.5 * (limits.position_upper - limits.position_lower)
 
     def masked(mask: BoolArray) -> FloatArray:
-        alone = bool(mask[channels.tool_slice].all()) and not commanded_joints(channels, mask).any()
-        return weight * narrow * (alone and leaves_freedom(channels, mask))
+        steered = np.zeros(len(narrow), dtype=bool)
+        for hand in range(len(channels.hands)):
+            if channels.twist_mask(mask, hand).all():
+                steered |= channels.moving(hand)
+        alone = not commanded_joints(channels, mask).any() and leaves_freedom(channels, mask)
+        return weight * narrow * (steered & alone)
 
     return (Objective("centring", lambda stage, p: (stage.q - middle) / half, np.zeros(len(middle)), masked),)

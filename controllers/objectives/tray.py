@@ -20,6 +20,7 @@ def tray_levelling(
     level: float = 2.0,
     slip: float = 0.5,
     friction: float = 0.2,
+    hand: int = 0,
 ) -> Objective:
     """Keep a tray level and what stands on it in place.
 
@@ -34,19 +35,20 @@ def tray_levelling(
         level: weight of the tilt [1/rad²].
         slip: weight of the tangential acceleration beyond the cone [s⁴/m²].
         friction: μ.
+        hand: that carries it.
     """
     axis = np.array(up, dtype=float) / np.linalg.norm(up)
 
     def residual(stage: Stage, p: ca.SX) -> ca.SX:
-        normal = stage.pose().rotation @ axis
-        force = acceleration(stage) + ca.DM([0.0, 0.0, GRAVITY])
+        normal = stage.tool(hand).rotation @ axis
+        force = acceleration(stage, hand) + ca.DM([0.0, 0.0, GRAVITY])
         pressing = ca.dot(force, normal)
         sliding = force - pressing * normal
         beyond = _hinge(1.0 - friction * pressing / _norm(sliding, _WIDTH), _SHARPNESS)
         return ca.vertcat(normal - ca.DM([0.0, 0.0, 1.0]), (_INSIDE + beyond) * sliding)
 
     def weights(mask: BoolArray) -> FloatArray:
-        tool, free = mask[channels.tool_slice], leaves_hand(channels, mask)
+        tool, free = channels.twist_mask(mask, hand), leaves_hand(channels, mask, hand)
         tilts = free and not tool[3:5].any()
         slips = leaves_freedom(channels, mask) and not tool[:3].all()
         return np.repeat([level * tilts, slip * slips], 3)
@@ -54,9 +56,9 @@ def tray_levelling(
     return Objective("tray", residual, np.zeros(6), weights)
 
 
-def acceleration(stage: Stage) -> ca.SX:
-    """Return the linear acceleration of the tool point, `J u + J̇ v`, (3, 1) [m/s²]."""
-    linear = stage.pose().jacobian[:3, :]
+def acceleration(stage: Stage, hand: int = 0) -> ca.SX:
+    """Return the linear acceleration of a hand's tool point, `J u + J̇ v`, (3, 1) [m/s²]."""
+    linear = stage.tool(hand).jacobian[:3, :]
     return linear @ stage.u + ca.jtimes(linear @ stage.v, stage.q, stage.v)
 
 

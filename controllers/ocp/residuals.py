@@ -36,11 +36,10 @@ class StageResiduals:
     """
 
     def __init__(self, model: RobotModel, objectives: tuple[Objective, ...], horizon: int) -> None:
-        names = [objective.name for objective in objectives]
-        if len(set(names)) != len(names):
-            raise HandrailError(f"objectives: expected distinct names, got {', '.join(names)}")
         n = model.size
         self.objectives = objectives
+        if len(set(self.names)) != len(self.names):
+            raise HandrailError(f"objectives: expected distinct names, got {', '.join(self.names)}")
         self._slices = _parameter_slices(objectives)
         z = ca.SX.sym("z", 3 * n)
         p = ca.SX.sym("p", sum(len(objective.parameters) for objective in objectives))
@@ -58,6 +57,11 @@ class StageResiduals:
     def parameters(self) -> FloatArray:
         """Every objective's parameters as they were at the beginning, (k,)."""
         return np.concatenate([objective.parameters for objective in self.objectives])
+
+    @property
+    def names(self) -> list[str]:
+        """Of the objectives."""
+        return [objective.name for objective in self.objectives]
 
     def parameter_slice(self, name: str) -> slice:
         """Return where an objective's parameters lie."""

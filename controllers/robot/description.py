@@ -1,10 +1,10 @@
 """A robot is data: the description file that MuJoCo, pinocchio and CasADi are all built from."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib import metadata
-from pathlib import Path, PurePosixPath
+from functools import cached_property
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -13,10 +13,10 @@ from msgspec import Meta, Struct
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.numerics.rotation import matrix_to_axis
-from handrail.controllers.regular_file import is_inside
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.parts import (
     ZERO,
+    Arm,
     AtLeastZero,
     Base,
     Camera,
@@ -31,10 +31,12 @@ from handrail.controllers.robot.parts import (
     WorldScale,
 )
 from handrail.controllers.robot.shape import Shape, ShapeKind
+from handrail.controllers.robot.urdf import chain, find_urdf
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import Fraction, Positive, Text, decoded
 
 SCENE_CAMERA = "scene"
+_WORD, _TAKEN = re.compile("[a-z][a-z0-9_]*"), ("apart", "arm", "base", "ee", "joint", "pair", "tool")
 _KINDS: tuple[ShapeKind, ...] = ("box", "capsule", "cylinder", "sphere")
 
 
@@ -44,11 +46,8 @@ class RobotDescription:
 
     name: str
     base: Base
-    urdf: Path
-    mesh_root: Path
-    mount: Placement
-    arm_joints: tuple[str, ...]
-    end_effector: EndEffector
+    arms: tuple[Arm, ...]
+    hands: tuple[EndEffector, ...]
     home: FloatArray
     limits: Limits
     collision: tuple[PlacedShape, ...]
@@ -64,17 +63,27 @@ class RobotDescription:
         _check_names(self)
 
     @property
+    def arm_joints(self) -> tuple[str, ...]:
+        """Names of the generalised coordinates that are not the base's."""
+        return tuple(joint for arm in self.arms for joint in arm.joints)
+
+    @property
     def joints(self) -> tuple[str, ...]:
         """Names of all generalised coordinates, base first."""
         return self.base.joints + self.arm_joints
+
+    @cached_property
+    def moves(self) -> tuple[tuple[bool, ...], ...]:
+        """Which joints move each hand, where there are several; () of a single one."""
+        if len(self.hands) == 1:
+            return ()
+        chains = [set(chain(self.arms, hand.frame)) | set(self.base.joints) for hand in self.hands]
+        return tuple(tuple(joint in moving for joint in self.joints) for moving in chains)
 
     @property
     def camera_names(self) -> tuple[str, ...]:
         """Names of the cameras that can be recorded: its own, and one that overlooks the scene."""
         return (*(camera.name for camera in self.cameras), SCENE_CAMERA)
-
-
-_files_of = cache(metadata.files)  # a thousand paths are looked for
 
 
 def robot_names() -> list[str]:
@@ -91,9 +100,8 @@ def load_description(robot: str | Path) -> RobotDescription:
         )
     where = f"robot description {path}"
     file = decoded(read_toml(path, "robot description"), _File, where)
-    urdf, mesh_root = _find_urdf(file.arm.urdf, path.parent)
     try:
-        return _described(file, urdf, mesh_root)
+        return _described(file, path.parent)
     except HandrailError as error:
         raise HandrailError(f"{where}: {error}") from error
 
@@ -102,15 +110,19 @@ def load_description(robot: str | Path) -> RobotDescription:
 class _Arm:
     urdf: Text
     joints: Annotated[tuple[Text, ...], Meta(min_length=1)]
+    prefix: str = ""
+    on: Text = "planar_base"
     translation: Vector = ZERO
     rpy: Vector = ZERO
 
 
 @dataclass(frozen=True)
-class _Tool:
+class _Hand:
     frame: Text
+    name: str = ""
     translation: Vector = ZERO
     rpy: Vector = ZERO
+    gripper: Gripper | None = None
 
 
 @dataclass(frozen=True)
@@ -161,7 +173,7 @@ class _Shape:
             kind: ShapeKind = next(kind for kind in _KINDS if getattr(self, kind) is not None)
             shape = Shape(kind, np.atleast_1d(getattr(self, kind)))
             placement = Placement.of(self.at or ZERO, self.rpy or ZERO)
-        return PlacedShape(self.name, self.frame, shape, placement, self.tool, self.rgba)
+        return PlacedShape(self.name, self.frame, shape, placement, self.tool, (*self.rgba, 1.0)[:4])
 
 
 class _Pair(Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
@@ -186,29 +198,27 @@ class _File:
 
     name: Text
     base: Base
-    arm: _Arm
-    tool: _Tool
+    arm: Annotated[tuple[_Arm, ...], Meta(min_length=1)]
+    hand: Annotated[tuple[_Hand, ...], Meta(min_length=1)]
     home: _Home
     limits: Limits
     self_collision: _SelfCollision
     collision: _Shapes
     visual: _Shapes = ()
     camera: tuple[Camera, ...] = ()
-    gripper: Gripper | None = None
     world: WorldScale = field(default_factory=WorldScale)
 
 
-def _described(file: _File, urdf: Path, mesh_root: Path) -> RobotDescription:
-    pairs, tool = file.self_collision.pairs, file.tool
-    placement = Placement.of(tool.translation, tool.rpy)
+def _described(file: _File, folder: Path) -> RobotDescription:
+    pairs = file.self_collision.pairs
     return RobotDescription(
         name=file.name,
         base=file.base,
-        urdf=urdf,
-        mesh_root=mesh_root,
-        mount=Placement.of(file.arm.translation, file.arm.rpy),
-        arm_joints=file.arm.joints,
-        end_effector=EndEffector("ee", tool.frame, placement, file.gripper),
+        arms=tuple(_arm(arm, folder) for arm in file.arm),
+        hands=tuple(
+            EndEffector(hand.name, hand.frame, Placement.of(hand.translation, hand.rpy), hand.gripper)
+            for hand in file.hand
+        ),
         home=file.home.q,
         limits=file.limits,
         collision=tuple(shape.placed() for shape in file.collision),
@@ -218,6 +228,12 @@ def _described(file: _File, urdf: Path, mesh_root: Path) -> RobotDescription:
         cameras=file.camera,
         world=file.world,
     )
+
+
+def _arm(arm: _Arm, folder: Path) -> Arm:
+    joints = tuple(arm.prefix + name for name in arm.joints)
+    place = Placement.of(arm.translation, arm.rpy)
+    return Arm(*find_urdf(arm.urdf, folder), arm.prefix, joints, arm.on, place)
 
 
 def _check_joints(robot: RobotDescription) -> None:
@@ -247,8 +263,13 @@ def _check_names(robot: RobotDescription) -> None:
     if "" in names:
         raise HandrailError(f"collision[{names.index('')}]: expected an entry 'name', found none")
     _check_once([" and ".join(sorted(pair)) for pair in robot.self_pairs], "self_collision: pairs")
-    gripper = robot.end_effector.gripper
-    used = [name for pair in robot.self_pairs for name in pair] + ([gripper.shape] if gripper else [])
+    _check_once([hand.name for hand in robot.hands], "hand: name")
+    for hand in robot.hands:
+        if (len(robot.hands) > 1) != bool(_WORD.fullmatch(hand.name)) or hand.name in _TAKEN:
+            words = "a name such as left of each of several, none of the only one"
+            raise HandrailError(f"hand: expected {words}, got {hand.name!r}")
+    fingers = [hand.gripper.shape for hand in robot.hands if hand.gripper]
+    used = [*(name for pair in robot.self_pairs for name in pair), *fingers]
     for name in used:
         if name not in names:
             raise unknown_name("collision shape", name, names)
@@ -259,26 +280,3 @@ def _check_names(robot: RobotDescription) -> None:
 def _check_once(names: Sequence[str], where: str) -> None:
     if twice := [name for name in names if names.count(name) > 1]:
         raise HandrailError(f"{where}: expected each once, got {twice[0]!r} twice")
-
-
-def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
-    """Return the URDF and the folder that its `package://` paths start from."""
-    name = PurePosixPath(urdf)
-    beside = folder / name
-    if not name.parts or name.is_absolute() or ".." in name.parts or not is_inside(beside, folder):
-        raise HandrailError(f"URDF {urdf}: expected a path inside a package, or beside the description")
-    if beside.is_file():
-        return beside, folder
-    distribution = name.parts[0]
-    try:
-        files = _files_of(distribution) or []
-    except metadata.PackageNotFoundError:
-        files = []
-    for file in files:
-        if PurePosixPath(file).parts[-len(name.parts) :] == name.parts:
-            path = Path(str(file.locate())).resolve()
-            return path, path.parents[len(name.parts) - 1]
-    raise HandrailError(
-        f"URDF {urdf}: expected it beside the description or in an installed package {distribution}, "
-        "found it in neither"
-    )

@@ -45,7 +45,7 @@ def _configuration(
 @lru_cache(maxsize=8)
 def _tool(model: RobotModel) -> Memory:
     """Return the compiled core's scene with nothing but the tool in it."""
-    memory, frame = joint_memory(model, 1, 0), model.pinocchio.frames[model.frame_id("tool")]
+    memory, frame = joint_memory(model, 1, 0), model.pinocchio.frames[model.frame_id("")]
     memory.carrier[0] = frame.parentJoint
     memory.shape_rotation[:], memory.shape_position[:] = (
         frame.placement.rotation.ravel(),

@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.core.library import Memory, constant
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.controllers.robot.description import RobotDescription, load_description
-from handrail.controllers.robot.parts import PlacedShape, Placement
-from handrail.controllers.robot.urdf import check_urdf
+from handrail.controllers.robot.parts import Arm, EndEffector, PlacedShape, Placement
+from handrail.controllers.robot.urdf import urdf_text
 
 _AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
@@ -33,14 +33,19 @@ class Pose:
 class RobotModel:
     """Forward kinematics and Jacobians, `q = (base, arm)`, `v = dq/dt`.
 
+    Args:
+        description: the data it is built from.
+        hand: number of the hand whose tool is meant where no frame is named.
+
     Attributes:
         description: the data it was built from.
+        number, hand: of the hand whose tool is meant where no frame is named, and that hand.
         pinocchio: the pinocchio model; never changed after construction.
         size: number of generalised coordinates n.
     """
 
-    def __init__(self, description: RobotDescription) -> None:
-        self.description = description
+    def __init__(self, description: RobotDescription, hand: int = 0) -> None:
+        self.description, self.number, self.hand = description, hand, description.hands[hand]
         self.pinocchio = _build(description)
         self.size = self.pinocchio.nv
         self._data = self.pinocchio.createData()
@@ -51,8 +56,22 @@ class RobotModel:
         """Names of the generalised coordinates."""
         return self.description.joints
 
+    @property
+    def moving(self) -> BoolArray:
+        """Which joints move the hand, (n,)."""
+        moves = self.description.moves
+        return np.array(moves[self.number] if moves else [True] * self.size)
+
+    def with_hand(self, name: str) -> "RobotModel":
+        """Return the model of the same robot that means another hand; the first one where it has no name."""
+        names = [hand.name for hand in self.description.hands]
+        if name and name not in names:
+            raise unknown_name("hand", name, names)
+        return _of_hand(self, names.index(name) if name else 0)
+
     def frame_id(self, frame: str) -> int:
-        """Return pinocchio's index of a frame."""
+        """Return pinocchio's index of a frame; of the hand's tool where it has no name."""
+        frame = frame or self.hand.named("tool")
         if frame not in self._frames:
             names = ", ".join(self._frames)
             raise HandrailError(f"frame {frame!r} of robot {self.description.name}: expected one of {names}")
@@ -63,14 +82,14 @@ class RobotModel:
         frame = self.pinocchio.frames[self.frame_id(placed.frame)]
         return frame.parentJoint, frame.placement * _se3(placed.placement)
 
-    def pose(self, q: FloatArray, frame: str = "tool") -> Pose:
-        """Return the pose of a frame at q, (n,)."""
+    def pose(self, q: FloatArray, frame: str = "") -> Pose:
+        """Return the pose of a frame at q, (n,); of the hand's tool by default."""
         pin.forwardKinematics(self.pinocchio, self._data, q)
         placement = pin.updateFramePlacement(self.pinocchio, self._data, self.frame_id(frame))
         return Pose(placement.translation.copy(), placement.rotation.copy())
 
-    def jacobian(self, q: FloatArray, frame: str = "tool") -> FloatArray:
-        """Return J with twist = J v, world-aligned at the frame's origin, linear rows first, (6, n)."""
+    def jacobian(self, q: FloatArray, frame: str = "") -> FloatArray:
+        """Return J with twist = J v, world-aligned at a frame's origin, linear rows first, (6, n)."""
         return pin.computeFrameJacobian(
             self.pinocchio, self._data, q, self.frame_id(frame), pin.LOCAL_WORLD_ALIGNED
         ).copy()
@@ -125,6 +144,11 @@ def _joint(model: RobotModel, number: int) -> Joint:
 
 
 @lru_cache(maxsize=8)
+def _of_hand(model: RobotModel, hand: int) -> RobotModel:
+    return model if hand == model.number else RobotModel(model.description, hand)
+
+
+@lru_cache(maxsize=8)
 def load_model(robot: str | Path = "ridgeback_ur10") -> RobotModel:
     """Build the model of a robot by name or description file."""
     return RobotModel(load_description(robot))
@@ -137,34 +161,38 @@ def _build(description: RobotDescription) -> pin.Model:
     for name in description.base.joints:
         joint = base.addJoint(joint, _BASE_JOINTS[name](), pin.SE3.Identity(), name)
     base.addFrame(pin.Frame("planar_base", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
-    model = pin.appendModel(base, _arm(description), base.getFrameId("planar_base"), _se3(description.mount))
+    model = base
+    for arm in description.arms:
+        if not model.existFrame(arm.on):
+            raise HandrailError(
+                f"arm {arm.prefix!r} of robot {description.name}: on {arm.on!r}: no such frame"
+            )
+        model = pin.appendModel(model, _arm(arm, description.name), model.getFrameId(arm.on), _se3(arm.mount))
     if tuple(model.names[1:]) != description.joints:
         raise HandrailError(f"joints of robot {description.name}: expected {description.joints}")
-    _add_tool(model, description)
+    for hand in description.hands:
+        _add_tool(model, hand, description.name)
     return model
 
 
-def _arm(description: RobotDescription) -> pin.Model:
-    """Return the arm with every joint that the description does not list locked at zero."""
-    check_urdf(description.urdf)
+def _arm(arm: Arm, robot: str) -> pin.Model:
+    """Return an arm with every joint that the description does not list locked at zero."""
     try:
         with _without_words():
-            model = pin.buildModelFromUrdf(str(description.urdf))
+            model = pin.buildModelFromXML(urdf_text(arm))
     except (ValueError, RuntimeError) as error:
-        raise HandrailError(f"URDF {description.urdf}: {message_of(error)}") from error
-    missing = set(description.arm_joints) - set(model.names)
+        raise HandrailError(f"URDF {arm.urdf}: {message_of(error)}") from error
+    missing = set(arm.joints) - set(model.names)
     if missing:
         raise HandrailError(
-            f"arm joints {sorted(missing)} of robot {description.name}: "
+            f"arm joints {sorted(missing)} of robot {robot}: "
             f"expected some of {', '.join(list(model.names)[1:])}"
         )
-    locked = [model.getJointId(name) for name in list(model.names)[1:] if name not in description.arm_joints]
-    arm = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
-    if arm.nq != arm.nv or arm.nv != len(description.arm_joints):
-        raise HandrailError(
-            f"arm of robot {description.name}: expected revolute or prismatic joints in its URDF"
-        )
-    return arm
+    locked = [model.getJointId(name) for name in list(model.names)[1:] if name not in arm.joints]
+    reduced = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+    if reduced.nq != reduced.nv or reduced.nv != len(arm.joints):
+        raise HandrailError(f"arm of robot {robot}: expected revolute or prismatic joints in its URDF")
+    return reduced
 
 
 @contextmanager
@@ -180,15 +208,15 @@ def _without_words() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _add_tool(model: pin.Model, description: RobotDescription) -> None:
-    if not model.existFrame(description.end_effector.frame):
-        raise HandrailError(
-            f"tool frame {description.end_effector.frame!r} of robot {description.name}: not in the URDF"
-        )
-    parent_id = model.getFrameId(description.end_effector.frame)
+def _add_tool(model: pin.Model, hand: EndEffector, robot: str) -> None:
+    if not model.existFrame(hand.frame):
+        raise HandrailError(f"tool frame {hand.frame!r} of robot {robot}: not in the URDF")
+    parent_id = model.getFrameId(hand.frame)
     parent = model.frames[parent_id]
-    placement = parent.placement * _se3(description.end_effector.placement)
-    model.addFrame(pin.Frame("tool", parent.parentJoint, parent_id, placement, pin.FrameType.OP_FRAME))
+    placement = parent.placement * _se3(hand.placement)
+    model.addFrame(
+        pin.Frame(hand.named("tool"), parent.parentJoint, parent_id, placement, pin.FrameType.OP_FRAME)
+    )
 
 
 def _se3(placement: Placement) -> pin.SE3:

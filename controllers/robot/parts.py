@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -159,13 +160,29 @@ class Gripper:
 
 
 @dataclass(frozen=True)
-class EndEffector:
-    """The end of an arm: the name of its channels, the frame that its placement is on, its gripper."""
+class Arm:
+    """What a URDF describes of a robot: an arm, or several with torso and head."""
 
-    name: str
+    urdf: Path
+    mesh_root: Path  # where its `package://` paths start from
+    prefix: str  # that names of its joints and frames begin with, where there are several
+    joints: tuple[str, ...]  # those that move, prefix included
+    on: str  # frame of the robot that it stands on
+    mount: Placement  # there
+
+
+@dataclass(frozen=True)
+class EndEffector:
+    """A hand: its tool point is placed on a frame."""
+
+    name: str  # among several, such as "left"; "" of the only one
     frame: str
     placement: Placement
     gripper: Gripper | None
+
+    def named(self, part: str) -> str:
+        """Return the name of a part of it: `tool` of the only hand, `left.tool` of one of several."""
+        return f"{self.name}.{part}" if self.name else part
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ class SymbolicPose:
     jacobian: ca.SX
 
 
-def symbolic_pose(model: RobotModel, q: ca.SX, frame: str = "tool") -> SymbolicPose:
+def symbolic_pose(model: RobotModel, q: ca.SX, frame: str = "") -> SymbolicPose:
     """Return the pose and the world-aligned geometric Jacobian of a frame at q, (n, 1).
 
     `p = p_j + R_j p_frame` along the chain of joints; a revolute column is `(z × (p - p_j), z)`, a

@@ -2,11 +2,14 @@
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from functools import cache
+from importlib import metadata
+from pathlib import Path, PurePosixPath
 
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import is_inside, open_regular, regular
+from handrail.controllers.robot.parts import Arm
 
 _MOST_BYTES = 16 * 2**20
 _MOST = 1000  # links, and joints: a chain of many more overflows the reader's stack
@@ -15,7 +18,33 @@ _NUMBERS = {
     *("xyz", "rpy", "lower", "upper", "velocity", "effort", "radius", "length", "size", "scale", "value"),
     *("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
 }
+_NAMES = {"link": ("name",), "joint": ("name",), "parent": ("link",), "child": ("link",), "mimic": ("joint",)}
+_TWICE = 4.0 * math.pi  # [rad]
+_files_of = cache(metadata.files)  # a thousand paths are looked for
 _INSIDE = ("package://", "model://")
+
+
+def find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
+    """Return the URDF and the folder that its `package://` paths start from."""
+    name = PurePosixPath(urdf)
+    beside = folder / name
+    if not name.parts or name.is_absolute() or ".." in name.parts or not is_inside(beside, folder):
+        raise HandrailError(f"URDF {urdf}: expected a path inside a package, or beside the description")
+    if beside.is_file():
+        return beside, folder
+    distribution = name.parts[0]
+    try:
+        files = _files_of(distribution) or []
+    except metadata.PackageNotFoundError:
+        files = []
+    for file in files:
+        if PurePosixPath(file).parts[-len(name.parts) :] == name.parts:
+            path = Path(str(file.locate())).resolve()
+            return path, path.parents[len(name.parts) - 1]
+    raise HandrailError(
+        f"URDF {urdf}: expected it beside the description or in an installed package {distribution}, "
+        "found it in neither"
+    )
 
 
 def check_urdf(urdf: Path) -> ET.Element:
@@ -31,6 +60,42 @@ def check_urdf(urdf: Path) -> ET.Element:
                     what = f"URDF {urdf}: {element.tag} {name}"
                     raise HandrailError(f"{what}: expected a finite number of sane size, got {word!r:.40}")
     return root
+
+
+def urdf_text(arm: Arm) -> str:
+    """Return an arm's URDF with its prefix; joints without limits turn twice around both ways."""
+    root = check_urdf(arm.urdf)
+    for joint in root.findall("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            limit = ET.SubElement(joint, "limit", effort="0", velocity="0") if limit is None else limit
+            limit.attrib |= {"lower": str(-_TWICE), "upper": str(_TWICE)}
+    if arm.prefix:
+        for element in root.iter():
+            for name in _NAMES.get(element.tag, ()):
+                if name in element.attrib:
+                    element.set(name, arm.prefix + element.attrib[name])
+    return ET.tostring(root, "unicode")
+
+
+def chain(arms: Sequence[Arm], frame: str) -> Iterator[str]:
+    """Yield the joints that move a frame, from it to the base, prefixes included."""
+    before: dict[str, tuple[str, str]] = {}
+    for arm in arms:
+        root = ET.fromstring(urdf_text(arm))
+        parts = [(joint, joint.find("parent"), joint.find("child")) for joint in root.findall("joint")]
+        found = {
+            c.get("link", ""): (j.get("name", ""), p.get("link", ""))
+            for j, p, c in parts
+            if p is not None and c is not None
+        }
+        links = {link.get("name", "") for link in root.findall("link")}
+        before |= dict.fromkeys(links - found.keys(), ("", arm.on)) | found
+    while frame in before:
+        joint, frame = before.pop(frame)
+        if joint:
+            yield joint
 
 
 def mesh_files(urdf: Path, folder: Path) -> Iterator[Path]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.trajectory import Trajectory
@@ -16,7 +16,6 @@ from handrail.datasets.format.schema import Feature
 
 FARTHEST = 10.0  # [m] what a distance is cut to: nothing is nearer, there is nothing to measure, or no state
 MOST = 1e6  # [m/s, rad/s, …] what any other number is cut to
-_TRUE = np.array([True])
 
 
 @dataclass(frozen=True)
@@ -28,8 +27,8 @@ class Frame:
     images: dict[str, np.ndarray]  # pictures by camera, (height, width, 3) uint8 each
     intent: Intent  # what the operator asked for
     action: FloatArray
-    """What was sent to the robot: velocities at the end of the period and the gripper, (n + 1,)."""
-    command: FloatArray  # what the controller asked for, (n + 1,); the robot's own limits may have cut it
+    """What was sent to the robot: velocities at the end of the period and grippers, (n + h,)."""
+    command: FloatArray  # what the controller asked for, (n + h,); the robot's own limits may have cut it
     diagnostics: Diagnostics  # of the controller
     contacts: int  # forbidden contacts in the period
     success: bool  # whether the task is done at the end of the period
@@ -58,7 +57,7 @@ COLUMNS = (
     Column("observation.environment_state", "float32", lambda frame: frame.environment, "environment"),
     Column("action", "float32", lambda frame: frame.action, "velocities"),
     Column("teleop.values", "float32", lambda frame: _asked(frame.intent), "asked"),
-    Column("teleop.mask", "bool", lambda frame: np.concatenate((frame.intent.mask, _TRUE)), "asked"),
+    Column("teleop.mask", "bool", lambda frame: _owned(frame.intent), "asked"),
     Column("teleop.mode", "string", lambda frame: frame.intent.mode),
     Column("teleop.raw", "float32", lambda frame: _raw(frame.intent), "channels"),
     Column("teleop.axes", "int64", lambda frame: frame.intent.raw.axes),
@@ -95,6 +94,7 @@ def frame_features(
     channels: Sequence[str],
     cameras: Sequence[str] = (),
     image_size: tuple[int, int] = (128, 128),
+    grippers: Sequence[str] = ("gripper",),
 ) -> dict[str, Feature]:
     """Return the columns of a robot, a task and its cameras.
 
@@ -105,13 +105,14 @@ def frame_features(
         channels: names of the command channels.
         cameras: names of the cameras.
         image_size: height and width [pixels].
+        grippers: names of those of the hands.
     """
     names = {
         "state": tuple(state),
         "environment": tuple(environment),
-        "velocities": (*(f"v_{name}" for name in joints), "gripper"),
+        "velocities": (*(f"v_{name}" for name in joints), *grippers),
         "channels": tuple(channels),
-        "asked": (*channels, "gripper"),
+        "asked": (*channels, *grippers),
     }
     features = {column.name: Feature(column.dtype) for column in COLUMNS} | {
         column.name: Feature(column.dtype, (len(names[column.parts]),), names[column.parts])
@@ -130,7 +131,11 @@ def frame_row(frame: Frame) -> dict[str, Any]:
 
 
 def _asked(intent: Intent) -> FloatArray:
-    return _finite(np.concatenate((np.where(intent.mask, intent.values, 0.0), (intent.gripper,))))
+    return _finite(np.concatenate((np.where(intent.mask, intent.values, 0.0), intent.grippers)))
+
+
+def _owned(intent: Intent) -> BoolArray:
+    return np.concatenate((intent.mask, np.ones(len(intent.grippers), dtype=bool)))
 
 
 def _raw(intent: Intent) -> FloatArray:

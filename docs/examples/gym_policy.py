@@ -36,9 +36,9 @@ def main() -> None:
         over = False
         while not over:
             state = env.state()
-            values[mpc.channels.tool_slice] = policy(observation)
+            values[mpc.channels.hand_slice()] = policy(observation)
             command = mpc.update(state, Intent(values, mask, time=state.time))
-            action = np.append(command.velocity(1.0 / env.fps), command.gripper)
+            action = np.append(command.velocity(1.0 / env.fps), command.grippers)
             observation, _, terminated, truncated, info = env.step(action)
             over = terminated or truncated
         result = "reached" if info["is_success"] else info["failure_reason"]

@@ -44,7 +44,7 @@ def controller(name):
 
 
 def of_the_tool(twist):
-    return dict(zip(CHANNELS.names[CHANNELS.tool_slice], twist, strict=True))
+    return dict(zip(CHANNELS.names[CHANNELS.hand_slice()], twist, strict=True))
 
 
 @given(NEAR_HOME, TWISTS, st.sampled_from(["world", "tool"]), arrays(float, 3, elements=st.floats(-0.3, 0.3)))
@@ -58,7 +58,7 @@ def test_a_twist_means_the_same_as_in_the_mpc(q, twist, frame, point):
     stage = Stage(MODEL, z[:9], z[9:18], z[18:])
     channels = ca.Function("channels", [z, p], [channel_velocities(stage, CHANNELS, p)])
     found = np.array(channels(np.concatenate([q, v, REST]), asked.frames.parameters)).ravel()
-    np.testing.assert_allclose(found[CHANNELS.tool_slice], twist, atol=1e-6)
+    np.testing.assert_allclose(found[CHANNELS.hand_slice()], twist, atol=1e-6)
 
 
 @given(NEAR_HOME, TWISTS, BASES)

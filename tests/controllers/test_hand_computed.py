@@ -78,7 +78,7 @@ def test_nobody_asks_the_tool_to_go_faster_than_the_largest_speed(axis):
     def plan(speed: float, largest: float) -> np.ndarray:
         mpc = MaskedMpc(MODEL, MpcSettings(largest_speed=largest))
         values = np.zeros(CHANNELS.size)
-        values[CHANNELS.tool_slice.start + axis] = speed
+        values[CHANNELS.hand_slice().start + axis] = speed
         command = mpc.update(STILL, Intent(values, CHANNELS.mask("ee")))
         return np.array([command.velocity(time) for time in (0.05, 0.2, 0.5)])
 

@@ -52,7 +52,7 @@ BAD_INTENTS = [
     *(
         {"values": np.full(18, np.nan)},
         {"values": np.full(18, np.inf)},
-        {"gripper": np.nan},
+        {"grippers": (np.nan,)},
         {"time": np.nan},
     ),
     *({"values": np.zeros(5), "mask": np.zeros(5, bool)}, {"mask": np.zeros(17, bool)}),
@@ -126,13 +126,13 @@ def test_a_clock_that_leaps_makes_an_intent_old(driven):
 
 def test_who_is_not_listened_to_does_not_open_the_hand(driven):
     robot, ask = driven
-    robot.update(replace(ask(robot.time), gripper=1.0))
+    robot.update(replace(ask(robot.time), grippers=(1.0,)))
     for stamp in (robot.time + 10.0, robot.time - 10.0):
-        assert robot.update(ask(stamp)).gripper == 1.0
+        assert robot.update(ask(stamp)).grippers == (1.0,)
     robot.controller.update_scene((WALL, WALL))
-    assert robot.controller.update(robot.state, ask(robot.time)).gripper == 1.0
+    assert robot.controller.update(robot.state, ask(robot.time)).grippers == (1.0,)
     robot.time += PERIOD
-    assert robot.update(ask(robot.time)).gripper == 0.0
+    assert robot.update(ask(robot.time)).grippers == (0.0,)
 
 
 @pytest.mark.parametrize("change", BAD_STATES)
@@ -145,7 +145,7 @@ def test_a_state_that_makes_no_sense_brakes(driven, change):
 def test_an_intent_that_makes_no_sense_brakes(driven, change):
     robot, ask = driven
     assert_braked(robot, lambda k: (replace(ask(robot.time), **change),), Status.INVALID_INTENT)
-    assert 0.0 <= robot.commands[-1].gripper <= 1.0
+    assert 0.0 <= robot.commands[-1].grippers[0] <= 1.0
 
 
 def test_obstacles_come_and_go_and_nothing_is_forgotten(driven):
@@ -226,7 +226,7 @@ def test_a_mask_is_bool(mask):
 def test_what_is_no_real_number_is_refused_in_one_line(value):
     for make in (
         lambda: Intent([value] * 18, np.zeros(18, bool)),
-        lambda: Intent(np.zeros(18), np.zeros(18, bool), gripper=value),
+        lambda: Intent(np.zeros(18), np.zeros(18, bool), grippers=(value,)),
         lambda: Intent(np.zeros(18), np.zeros(18, bool), time=value),
         lambda: State([value] * 9, np.zeros(9)),
         lambda: State(np.zeros(9), np.zeros(9), time=value),

@@ -36,7 +36,7 @@ def test_bounded_holds_for_a_way_not_for_a_time(speed):
 
 def test_bounded_ends_with_the_first_of_way_and_turn():
     values = np.zeros(18)
-    values[CHANNELS.tool_slice] = [0.1, 0.0, 0.0, 0.0, 0.0, 1.0]
+    values[CHANNELS.hand_slice()] = [0.1, 0.0, 0.0, 0.0, 0.0, 1.0]
     predicted = Bounded(CHANNELS, distance=1.0, angle=0.55)(intent(values, "ee"), TIMES)
     np.testing.assert_array_equal(predicted[:5], np.tile(values, (5, 1)))
     np.testing.assert_array_equal(predicted[5:], 0.0)
@@ -111,7 +111,9 @@ def test_turns_may_be_followed_less_closely_than_the_way():
     for weight in (1000.0, 0.5):
         controller = MaskedMpc(MODEL, MpcSettings(turn_tracking=weight))
         q, v, _ = roll(controller, [asking(asked, "ee")] * 30)
-        errors.append(np.abs(MODEL.jacobian(q[-1]) @ v[-1] - intent(asked, "ee").values[CHANNELS.tool_slice]))
+        errors.append(
+            np.abs(MODEL.jacobian(q[-1]) @ v[-1] - intent(asked, "ee").values[CHANNELS.hand_slice()])
+        )
     assert errors[0].max() < 0.01
     assert errors[1][:3].max() < 0.01
     assert errors[1][3:].max() > 0.02

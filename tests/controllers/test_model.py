@@ -78,7 +78,7 @@ def test_home_puts_the_tool_where_the_robot_has_it():
         ("b = [0.27, 0.01, 0.63]", "b = [0.27, 0.01, 0.28]", "expected a capsule from a to b, apart"),
         ('["chassis", "upper_arm"]', '["chassis", "tail"]', "collision shape 'tail'"),
         ('["chassis", "upper_arm"]', '["chassis", "elbow"]', "pairs: expected each once"),
-        ("[gripper]", '[gripper]\nshape = "paw"', "collision shape 'paw'"),
+        ("[hand.gripper]", '[hand.gripper]\nshape = "paw"', "collision shape 'paw'"),
         ('name = "mount"', 'name = "chassis"', "collision: expected each once, got 'chassis' twice"),
         ('"shoulder_pan_joint"', '"shoulder_lift_joint"', "joints: expected each once"),
         ('urdf = "example', 'urdf = "no-such', "URDF no-such-robot-data"),

@@ -83,7 +83,7 @@ def beside(folder: Path, urdf: str) -> Path:
 
 
 def test_a_urdf_lies_beside_the_description_and_is_one(tmp_path):
-    own = load_description("ridgeback_ur10").urdf
+    own = load_description("ridgeback_ur10").arms[0].urdf
     (home := tmp_path / "home").mkdir()
     path = beside(home, "arm.urdf")
     shutil.copy(own, home / "arm.urdf")

@@ -61,5 +61,5 @@ def drive(view, mode, human, seconds=12.0, script=None, start=HOME, seed=0):
 
 
 def at(view, q, v, time) -> View:
-    task = TaskState(time, MODEL.pose(q), 1.0, view.task.start, view.task.poses)
+    task = TaskState(time, (MODEL.pose(q),), (1.0,), view.task.start, view.task.poses)
     return View(State(q, v, time), task)

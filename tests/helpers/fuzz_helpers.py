@@ -174,7 +174,7 @@ def run(
     standing = {item.name for item in scene.objects} - moving | {"floor"}
     previous, every = np.zeros(model.size), round(gap / PERIOD)
     for step in range(int(seconds / PERIOD)):
-        state, hand = simulation.state(), simulation.tool.position
+        state, hand = simulation.state(), simulation.tools[0].position
         if step % every == 0:
             if movers:
                 controller.update_scene(scene.obstacles(state.time))
@@ -193,5 +193,5 @@ def run(
             kind.append(f"{pair} at {state.time:.2f} s, {command.diagnostics.status}")
         if result.moving:
             break
-        result.travelled += float(np.linalg.norm(simulation.tool.position - hand))
+        result.travelled += float(np.linalg.norm(simulation.tools[0].position - hand))
     return result

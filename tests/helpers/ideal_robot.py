@@ -24,9 +24,9 @@ TRAIL = 5  # positions looked at in a period
 
 def without_shapes(description: RobotDescription) -> RobotModel:
     """Return a robot that can meet nothing, without a gripper."""
-    hand = replace(description.end_effector, gripper=None)
+    hands = tuple(replace(hand, gripper=None) for hand in description.hands)
     nothing = {"collision": (), "self_pairs": (), "self_margins": np.zeros(0)}
-    return RobotModel(replace(description, end_effector=hand, **nothing))
+    return RobotModel(replace(description, hands=hands, **nothing))
 
 
 class Robot:

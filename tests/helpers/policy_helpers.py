@@ -89,7 +89,7 @@ def checkpoint(
     env = build_env(SessionConfig(task=task), 20)
     channels = Channels.of(env.model.description)
     focuses = ("base", "hand")
-    groups = [MODES[mode].groups(focus) for focus in focuses]
+    groups = [MODES[mode].owned(focus) for focus in focuses]
     if mode == "direct_single":  # one axis at a time
         groups = [(name,) for name in (*channels.base, *channels.joints[3:])]
     masks = {tuple(channels.mask(*names).tolist()) for names in groups}

@@ -10,6 +10,7 @@ from handrail.collect.operators.person.inputs import Input
 from handrail.collect.operators.scripted.input_map import StickMap
 from handrail.collect.operators.scripted.steering import FOLLOW, Gains
 from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
@@ -52,6 +53,9 @@ class InputMeaning:
     """
 
     def __init__(self, model: RobotModel, mode: TeleopMode) -> None:
+        if len(model.description.hands) > 1:
+            words = "expected a robot with one hand where a person steers; scripts steer robots with several"
+            raise HandrailError(f"robot {model.description.name}: {words}")
         self.channels = Channels.of(model.description)
         self._base = len(self.channels.base)
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
@@ -64,7 +68,7 @@ class InputMeaning:
 
     def mask(self, setting: Setting) -> BoolArray:
         """Return the channels that the operator owns, (m,)."""
-        mask = self.channels.mask(*setting.mode.groups(setting.focus))
+        mask = self.channels.mask(*setting.mode.owned(setting.focus))
         mask[[self.channels.joint_slice.start + joint for joint in setting.locked]] = True
         return mask
 
@@ -89,7 +93,7 @@ class InputMeaning:
             alone = np.arange(mask.size) == setting.axis
             mask, raw = mask & alone, np.where(alone, raw, 0.0)
         values = setting.speed * self._full * raw
-        tool, joints = self.channels.tool_slice, self.channels.joint_slice
+        tool, joints = self.channels.hand_slice(), self.channels.joint_slice
         values[tool] = self._hand(values[tool], inputs, setting, state)
         if self._base and mask[joints][: self._base].all() and not mask[self.channels.base_slice].any():
             values[joints.start : joints.start + self._base] += turned(
@@ -104,7 +108,7 @@ class InputMeaning:
         return Intent(
             np.where(mask, values, 0.0),
             mask,
-            gripper=float(inputs.grip),
+            grippers=(float(inputs.grip),),
             mode=setting.mode.name,
             time=state.time,
             frames=Frames(tool="tool" if setting.frame == "tool" else "world"),

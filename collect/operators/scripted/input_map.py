@@ -97,8 +97,9 @@ class InputMap(ABC):
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
         hand, base = gains.full[:6], gains.full[6:][: self._base]
         joints = np.concatenate([base, np.full(model.size - self._base, gains.joint_rate)])
-        self.full: FloatArray = np.concatenate([base, hand, joints])
-        self.fine: FloatArray = np.concatenate([base, hand, as_fine(model, joints, hand) * joints])
+        twists = [hand] * len(self.channels.hands) + ([hand, hand[:1]] if self.channels.pair else [])
+        self.full: FloatArray = np.concatenate([base, *twists, joints])
+        self.fine: FloatArray = np.concatenate([base, *twists, as_fine(model, joints, hand) * joints])
 
     @abstractmethod
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
@@ -135,7 +136,7 @@ class StickMap(InputMap):
     def mask(self, focus: Focus) -> BoolArray:
         """Return the channels that the operator owns, (m,)."""
         if focus not in self._masks:
-            self._masks[focus] = self.channels.mask(*self.mode.groups(focus))
+            self._masks[focus] = self.channels.mask(*self.mode.owned(focus, self._model.hand.name))
         return self._masks[focus]
 
     def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
@@ -143,7 +144,9 @@ class StickMap(InputMap):
         mask = self.mask(goal.focus)
         values = np.zeros(self.channels.size)
         values[self.channels.base_slice] = goal.base[: self._base]
-        values[self.channels.tool_slice] = goal.hand
+        values[self.channels.hand_slice(self._model.number)] = goal.hand
+        if self.channels.pair:  # whoever steers both moves them as they would move the one
+            values[self.channels.pair_slice][:6] = goal.hand
         if mask[self.channels.joint_slice].any():
             values[self.channels.joint_slice] = self._joint_velocities(goal, state.q)
         return mask, np.minimum(np.maximum(np.where(mask, values, 0.0), -self.full), self.full)

@@ -82,7 +82,7 @@ class PickPlaceScript(PhasedScript):
 
         `(stroke − w (cos a + sin a)) / 2` for a cube of width w that is turned by a; as much either way.
         """
-        gripper, near = self._model.description.end_effector.gripper, _NEAR * self._grip
+        gripper, near = self._model.hand.gripper, _NEAR * self._grip
         turned = width * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
         return near if gripper is None else max(near, (gripper.stroke - turned) / 2)
 
@@ -115,7 +115,7 @@ def _above(position: FloatArray, height: float) -> FloatArray:
 
 def tips_beyond_tool(model: RobotModel) -> float:
     """Return how far the finger tips are beyond the tool point [m]; 0 of a robot without fingers."""
-    gripper, home = model.description.end_effector.gripper, model.description.home
+    gripper, home = model.hand.gripper, model.description.home
     if gripper is None:
         return 0.0
     frame, tool = model.pose(home, gripper.frame), model.pose(home)

@@ -33,7 +33,8 @@ def arm_solutions(model: RobotModel, q: FloatArray, goal: Pose) -> list[tuple[Fl
         goal: of the tool.
     """
     base = len(model.description.base.joints)
-    turns = (angle * axis for axis in np.eye(model.size)[base:] for angle in _TURNS)
+    moving = model.moving & (np.arange(model.size) >= base)
+    turns = (angle * axis for axis in np.eye(model.size)[moving] for angle in _TURNS)
     starts = [q, np.concatenate([q[:base], model.description.home[base:]]), *(q + turn for turn in turns)]
     found = [arm_configuration(model, start, goal) for start in starts]
     unwound = [(_unwound(model, q, there), error) for there, error in found]
@@ -138,7 +139,7 @@ def standing_pose(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:
     """
     if not model.description.base.joints:
         return np.zeros(3)
-    if len(model.description.arm_joints) < 6:
+    if np.count_nonzero(model.moving) < 6 + len(model.description.base.joints):
         return _standing_in_line(model, q, goal)
     collision, best, fewest = CollisionModel(model), standing_point(model, goal.position), np.inf
     clear = _SELF_CLEAR * model.description.world.scale

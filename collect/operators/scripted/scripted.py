@@ -106,7 +106,9 @@ class ScriptedOperator:
         moved = np.where(mask, moved, 0.0)
         values = np.where(mask, self._map.sent(moved, view.state), 0.0)
         raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
-        return Intent(values, mask, goal.gripper, self._mode.name, time, raw=raw)
+        hands = range(len(self._map.channels.hands))
+        grippers = tuple(goal.gripper if hand == view.task.hand else 0.0 for hand in hands)
+        return Intent(values, mask, grippers, self._mode.name, time, raw=raw)
 
     def _switch(self, mask: BoolArray, time: float) -> None:
         """Take the hand off the input for a moment when it acts on other channels from now on."""

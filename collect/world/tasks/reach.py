@@ -84,7 +84,7 @@ def sample_goal_for(model: RobotModel, rng: np.random.Generator) -> Pose:
     from some place of the base, clear of itself and of the floor.
     """
     description = model.description
-    world, joints = description.world, len(description.arm_joints)
+    world, joints = description.world, np.count_nonzero(model.moving) - len(description.base.joints)
     lower, upper = (-world.scale, -world.scale, world.goals[0]), (world.scale, world.scale, world.goals[1])
     if joints >= 6:
         return sample_goal(rng, lower, upper)

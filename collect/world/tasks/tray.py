@@ -73,7 +73,7 @@ class Tray(Task):
         )  # under a hand that points down, the bar along its y
         held = tray("tray", tool.position, level, _SIZE, _TRAY_MASS)
         objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
-        return Start(Scene(objects, _VIEW), q, grip=TRAY_BAR)
+        return Start(Scene(objects, _VIEW), q, grip=(TRAY_BAR,))
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (29,)."""

@@ -146,7 +146,7 @@ class _Watcher:
         """Take this moment."""
         env = self._env
         truth = env.task_state()
-        state = self._agent.read(env.state(), truth.tool, truth.opening)
+        state = self._agent.read(env.state(), truth.tools, truth.openings)
         around = np.asarray(env.task.features(truth), np.float32)
         cameras = map(env.simulation.camera, self._cameras)
         views = [(*at.position, *at.rotation.ravel(), np.tan(np.deg2rad(fovy) / 2)) for at, fovy in cameras]

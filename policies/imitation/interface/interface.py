@@ -145,7 +145,7 @@ class PolicyInterface:
             values[:, pair] = pose.turned_back(values[:, pair])
         flags = action[count:-1]
         mask = np.array(self._sets[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
-        return Intent(values[0], mask, gripper=decided_gripper(action[-1]))
+        return Intent(values[0], mask, (decided_gripper(action[-1]),))
 
     def asked(self, action: FloatArray, state: FloatArray) -> FloatArray:
         """Return the values of the channels that an action (a,) asks for, the focus (1 base), the gripper.
@@ -154,12 +154,11 @@ class PolicyInterface:
         """
         intent = self.decode(action, state)
         focus = [float(intent.mask[0])] if len(self.masks) > 1 else []
-        return np.array([*intent.values[self._commanded], *focus, intent.gripper])
+        return np.array([*intent.values[self._commanded], *focus, *intent.grippers])
 
     @cached_property
     def _known(self) -> Channels:
-        parts = [tuple(n for n in self.channels if n.startswith(kind)) for kind in ("base.", "ee.", "joint.")]
-        return Channels(*parts)
+        return Channels.named(self.channels)
 
     @cached_property
     def _joints(self) -> tuple[str, ...]:
@@ -216,7 +215,7 @@ class PolicyInterface:
     @cached_property
     def _pairs(self) -> list[list[int]]:
         """(x, y) pairs of velocities along the world's axes; one that a mask splits stays so."""
-        tool, joint = self._known.tool_slice.start, self._known.joint_slice.start
+        tool, joint = self._known.hand_slice().start, self._known.joint_slice.start
         starts = (tool, tool + 3, joint) if self._known.base else (tool, tool + 3)
         return [[s, s + 1] for s in starts if all(mask[s] == mask[s + 1] for mask in self._sets)]
 

@@ -105,7 +105,7 @@ class CompletedRobot:
             intent = self._interface.decode(action, state)
         asked = replace(intent, mode=self._by.mode, time=now)
         command = self._controller.update(State(state[:n], state[n : 2 * n], now, sent), asked)
-        return np.append(command.velocity(1.0 / self._by.fps), command.gripper)
+        return np.append(command.velocity(1.0 / self._by.fps), command.grippers)
 
 
 @dataclass(eq=False)

@@ -79,7 +79,7 @@ def goal_reaching_prediction(channels: Channels) -> Prediction:
         channels: of the robot.
     """
     time_constant = np.full(channels.size, TAKE_UP[0])
-    time_constant[channels.tool_slice][3:] = TAKE_UP[1]
+    time_constant[channels.hand_slice()][3:] = TAKE_UP[1]
     return Smoothed(Bounded(channels), time_constant)
 
 

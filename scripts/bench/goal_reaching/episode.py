@@ -129,13 +129,13 @@ class _Observer:
         if self._baseline.aims:
             self._controller.aim(self._goal)  # pyright: ignore[reportAttributeAccessIssue]
         self._plant = env.plant
-        self._states, self._tools = [self._plant.state()], [self._plant.tool]
+        self._states, self._tools = [self._plant.state()], [self._plant.tools[0]]
         self._contacts: list[tuple[str, ...]] = []
         self._updates: dict[int, Diagnostics] = {}  # an update's are in all frames until the next
 
     def see(self, frame: Frame) -> None:
         self._states.append(self._plant.state())
-        self._tools.append(self._plant.tool)
+        self._tools.append(self._plant.tools[0])
         self._contacts.append(self._plant.contacts)
         self._updates[id(frame.diagnostics)] = frame.diagnostics
 

@@ -134,7 +134,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def _measure(self) -> None:
         """Look where the robot is and how it moves."""
-        state, tool = self._plant.state(), self._plant.tool
+        state, tool = self._plant.state(), self._plant.tools[0]
         self.q, self.velocity, self._pose = state.q, state.v, (tool.position, tool.rotation)
 
     def _observation(self) -> FloatArray:

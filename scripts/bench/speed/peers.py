@@ -136,7 +136,7 @@ def _pink(loop: TimingLoop) -> Take:
     model.velocityLimit = limits.velocity
     task = pink.FrameTask("tool", position_cost=1.0, orientation_cost=1.0)
     tasks = [task, pink.tasks.DampingTask(cost=0.01)]
-    twist = Channels.of(loop.model.description).tool_slice
+    twist = Channels.of(loop.model.description).hand_slice()
     among: Any = None
     configuration: Any = None
     kept: list[Any] = []

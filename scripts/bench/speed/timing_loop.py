@@ -160,7 +160,7 @@ class TimingLoop:
         values = rng.uniform(-speed, speed, channels.size)
         if self._obstacles:
             target = self._obstacles[rng.integers(len(self._obstacles))].position
-            values[channels.tool_slice][:3] = speed * _unit(target - self.model.pose(state.q).position)
+            values[channels.hand_slice()][:3] = speed * _unit(target - self.model.pose(state.q).position)
             if channels.base:
                 values[:2] = speed * turned(_unit(target[:2] - state.q[:2]), -state.q[2])
         return Intent(np.where(mask, values, 0.0), mask, time=state.time)
@@ -179,8 +179,8 @@ def _robot(case: SpeedCase) -> tuple[RobotModel, int]:
     file, words = _ROBOTS[case.degrees]
     description = _without(load_description(file), words)
     if not case.pairs:
-        hand, none = replace(description.end_effector, gripper=None), np.zeros(0)
-        bare = replace(description, end_effector=hand, collision=(), self_pairs=(), self_margins=none)
+        hands, none = tuple(replace(hand, gripper=None) for hand in description.hands), np.zeros(0)
+        bare = replace(description, hands=hands, collision=(), self_pairs=(), self_margins=none)
         return RobotModel(bare), 0
     model = RobotModel(description)
     each, floor, own = len(scene_shapes(model)), len(floor_shapes(model)), len(description.self_pairs)
@@ -202,7 +202,7 @@ def _without(description: RobotDescription, words: tuple[str, ...]) -> RobotDesc
     limits = description.limits
     return replace(
         description,
-        arm_joints=tuple(filter(stays, description.arm_joints)),
+        arms=tuple(replace(arm, joints=tuple(filter(stays, arm.joints))) for arm in description.arms),
         home=description.home[joints],
         limits=replace(limits, **{each.name: getattr(limits, each.name)[joints] for each in fields(limits)}),
         collision=tuple(shape for shape in description.collision if stays(shape.name)),

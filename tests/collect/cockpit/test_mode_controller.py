@@ -30,7 +30,7 @@ def test_no_change_of_mode_jolts(env):
     names, before, fastest = list(MODES), np.zeros(model.size), 0.0
     for step in range(66):
         mode = modes[names[step // 3 % len(names)]]
-        mask = channels.mask(*mode.groups("hand"))
+        mask = channels.mask(*mode.owned("hand"))
         values = np.where(mask, rng.uniform(-0.3, 0.3, channels.size), 0.0)
         state = env.state()
         command = controller.update(state, Intent(values, mask, mode=mode.name, time=state.time))

@@ -108,7 +108,7 @@ def test_any_doubt_about_either_hand_brakes_until_the_clutch_was_let_go(driven, 
 
 
 def test_its_handle_is_the_gripper(driven):
-    assert driven.act().gripper == 0.0
+    assert driven.act().grippers == (0.0,)
     for place, closed in ((55.0, 0.0), (30.0, 1.0), (55.0, 1.0), (70.0, 0.0)):
         driven.main.joints["handle.pos"] = place
-        assert driven.act().gripper == closed
+        assert driven.act().grippers == (closed,)

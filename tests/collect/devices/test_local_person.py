@@ -20,7 +20,7 @@ def test_forward_is_forward_in_the_robots_own_frame(device):
     driven.begin()
     driven.push()
     intent = driven.act()
-    assert intent.values[CHANNELS.tool_slice][:3] == pytest.approx([0.0, 0.21, 0.0], abs=1e-9)
+    assert intent.values[CHANNELS.hand_slice()][:3] == pytest.approx([0.0, 0.21, 0.0], abs=1e-9)
     assert np.array_equal(intent.mask, CHANNELS.mask("ee"))
     assert intent.raw.device == device
 
@@ -132,7 +132,7 @@ def test_choices_while_driving():
     intent = driven.act()
     setting = driven.person.setting
     assert (setting.focus, setting.speed, setting.frame) == ("base", 1.0, "tool")
-    assert intent.gripper == 1.0
+    assert intent.grippers == (1.0,)
     assert np.array_equal(intent.mask, CHANNELS.mask("base"))
     driven.main.presses = ["]"]
     assert driven.act().mode == list(MODES)[list(MODES).index("switching") + 1]

@@ -10,7 +10,7 @@ from lerobot.envs.utils import env_to_policy_features, preprocess_observation
 from places import ROOT
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.lerobot import HandrailSim, HandrailSimConfig
+from handrail.collect.lerobot import HandrailSim, HandrailSimConfig, plugins  # noqa: F401
 from handrail.collect.lerobot.names import lerobot_name
 from handrail.collect.seeds import FIRST_SEED
 from handrail.collect.session.build import build_env

@@ -87,7 +87,7 @@ def test_the_hand_never_leaves_the_stick():
 def test_a_person_is_as_exact_at_the_tool_with_joints_as_with_the_hand(name):
     model, times = load_model(name), PERIOD * np.arange(4000)
     sticks = StickMap(model, MODES["direct"], Gains().within(model.description.world))
-    tool, joints = sticks.channels.tool_slice, sticks.channels.joint_slice
+    tool, joints = sticks.channels.hand_slice(), sticks.channels.joint_slice
     hand = HumanHand(human(drift=0.02, correlation=0.2), sticks.full, sticks.fine, np.random.default_rng(0))
     wanted = 1e-9 * sticks.full  # touched, and next to nothing
     moved = np.array([hand.move(wanted, time) for time in times])

@@ -30,7 +30,7 @@ class Counter:
         values = 0.01 * (np.arange(CHANNELS.size) + 1.0) + k
         raw = RawInput(-0.5 * values, 100 + k, 200 + 3 * k, f"device {k}", 0.2 + k, 0.3 + k)
         mask = (np.arange(CHANNELS.size) + k) % 3 == 0
-        self.intents.append(Intent(values, mask, 0.01 * k, f"mode {k}", view.state.time, raw=raw))
+        self.intents.append(Intent(values, mask, (0.01 * k,), f"mode {k}", view.state.time, raw=raw))
         self.views.append(view)
         return self.intents[-1]
 
@@ -55,7 +55,9 @@ class Answer:
             work_distance=1.5 + 0.01 * k,
         )
         velocities = np.stack([state.commanded, wanted, 0.0 * wanted])
-        self.commands.append(Command(velocities, 1.0 / FPS, gripper=0.5 + 0.01 * k, diagnostics=diagnostics))
+        self.commands.append(
+            Command(velocities, 1.0 / FPS, grippers=(0.5 + 0.01 * k,), diagnostics=diagnostics)
+        )
         return self.commands[-1]
 
 
@@ -88,7 +90,7 @@ def test_every_column_is_what_its_source_said(tmp_path):
         "observation.state": [view.observation["agent_pos"] for view in views],
         "observation.environment_state": [env.task.features(view.task) for view in views],
         "action": [*(info["sent"] for info in infos)],
-        "teleop.values": [np.append(np.where(i.mask, i.values, 0.0), i.gripper) for i in intents],
+        "teleop.values": [np.append(np.where(i.mask, i.values, 0.0), i.grippers) for i in intents],
         "teleop.mask": [[*intent.mask, True] for intent in intents],
         "teleop.mode": [f"mode {k}" for k in range(STEPS)],
         "teleop.raw": [intent.raw.values for intent in intents],
@@ -98,7 +100,7 @@ def test_every_column_is_what_its_source_said(tmp_path):
         "teleop.age": [0.2 + k for k in range(STEPS)],
         "teleop.round_trip": [0.3 + k for k in range(STEPS)],
         "teleop.undos": [0] * STEPS,
-        "controller.command": [np.append(command.velocities[1], command.gripper) for command in commanded],
+        "controller.command": [np.append(command.velocities[1], command.grippers) for command in commanded],
         "controller.status": [one.status.value for one in told],
         "controller.solve_time": [one.solve_time for one in told],
         "controller.slack": [one.slack for one in told],

@@ -35,7 +35,7 @@ class Person:
         if isinstance(what, EpisodeEvent):
             return what
         values = np.zeros(self._channels.size)
-        values[self._channels.tool_slice][:3] = what
+        values[self._channels.hand_slice()][:3] = what
         return Intent(values, self._channels.mask("ee"), mode="ee", time=view.state.time)
 
 

@@ -27,7 +27,7 @@ def test_what_a_person_is_told_of_the_goal_is_what_the_judge_says(scale):
             aim = aim_of(env, state)
             turn = rng.uniform(0.0, 2.0) * aim.angle * _direction(rng)
             place = aim.position + rng.uniform(0.0, 2.0) * aim.distance * _direction(rng)
-            now = replace(state, tool=Pose(place, aim.rotation @ Rotation.from_rotvec(turn).as_matrix()))
+            now = replace(state, tools=(Pose(place, aim.rotation @ Rotation.from_rotvec(turn).as_matrix()),))
             near = np.linalg.norm(place - aim.position) <= aim.distance
             told.append(bool(near and np.linalg.norm(turn) <= aim.angle))
             assert env.task.outcome(now).success == told[-1]
@@ -44,7 +44,7 @@ def done(env, state, position):
 
     def around(far):
         tools = [Pose(position + far * side, np.eye(3)) for side in (*np.eye(3), *-np.eye(3))]
-        return {env.task.outcome(replace(state, opening=1.0, tool=tool)).success for tool in tools}
+        return {env.task.outcome(replace(state, openings=(1.0,), tools=(tool,))).success for tool in tools}
 
     return around(0.079), around(0.081)
 
@@ -83,6 +83,6 @@ def test_the_hand_is_led_to_the_cube_then_to_the_bin():
         np.testing.assert_allclose(aim.position, state.pose("cube").position)
         assert aim.rotation is not None
         np.testing.assert_allclose(aim.rotation, state.tool.rotation, atol=1e-3)
-        taken = aim_of(env, replace(state, opening=0.5))
+        taken = aim_of(env, replace(state, openings=(0.5,)))
         assert taken.name == "bin"
         assert taken.position[2] > state.object("bin").top

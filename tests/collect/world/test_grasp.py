@@ -40,7 +40,7 @@ def test_the_fingers_hold_what_both_of_them_touch():
 def test_fingers_that_rest_on_a_thing_do_not_hold_it():
     with environment("PickPlace") as env:
         start = over_cube(env, 3, 0.045)  # the finger tips 5 mm above the cube
-        env.reset(options={"start": Start(start.scene, start.q, grip=0.0)})
+        env.reset(options={"start": Start(start.scene, start.q, grip=(0.0,))})
         touched = False
         for _ in range(30):
             down = np.linalg.pinv(env.model.jacobian(env.state().q)) @ [0.0, 0.0, -0.01, 0.0, 0.0, 0.0]
@@ -125,7 +125,7 @@ class Closing:
 def test_the_operator_closes_the_gripper_around_the_cube(robot, mode):
     """The cube is between the fingers, with what the hand may be turned; their tips are beside it."""
     model, edge, watch = load_model(robot), 0.05, Closing()
-    gripper = model.description.end_effector.gripper
+    gripper = model.description.hands[0].gripper
     outcome = episode(100, watch, task="pick_place", mode=mode, robot=robot)
     assert outcome.success
     if mode != "direct":

@@ -87,7 +87,7 @@ def towards_the_base(held):
     goal = MODEL.pose(HOME, "planar_base").position + [0.2, 0.0, 1.0]
     for _ in range(160):
         direction, values = goal - MODEL.pose(robot.q).position, np.zeros(CHANNELS.size)
-        values[CHANNELS.tool_slice][:3] = 0.3 * direction / max(np.linalg.norm(direction), 0.1)
+        values[CHANNELS.hand_slice()][:3] = 0.3 * direction / max(np.linalg.norm(direction), 0.1)
         robot.update(intent(values, "base", "ee", time=robot.time))
         smallest = min(smallest, truth.values(robot.q[None])[0, held_rows(truth)].min())
     return smallest, {command.diagnostics.status for command in robot.commands}
@@ -115,7 +115,7 @@ def test_a_grasp_beside_an_obstacle_moves_nothing_and_the_thing_may_come_away(bu
     for k in range(160):
         rate = 0.0 if k < 40 else -0.05 if k < 100 else 0.05  # rest, away, back
         twist, values = np.append(rate * ahead, np.zeros(3)), np.zeros(CHANNELS.size)
-        values[CHANNELS.tool_slice] = twist
+        values[CHANNELS.hand_slice()] = twist
         values[CHANNELS.joint_slice] = np.linalg.pinv(MODEL.jacobian(robot.q)) @ twist
         robot.update(intent(values, group, time=robot.time))
         gaps.append(truth.values(robot.q[None])[0, row])

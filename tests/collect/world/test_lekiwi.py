@@ -44,7 +44,7 @@ def test_no_command_inside_the_limits_turns_a_wheel_faster_than_lerobot_lets_it(
 
 def test_the_arm_is_the_urdfs():
     """Its ranges; and the hand is where the URDF alone has it on the base, for any configuration."""
-    arm = pin.buildModelFromUrdf(str(ROBOT.urdf))
+    arm = pin.buildModelFromUrdf(str(ROBOT.arms[0].urdf))
     data, first = arm.createData(), len(ROBOT.base.joints)
     np.testing.assert_allclose(ROBOT.limits.position_lower[first:], arm.lowerPositionLimit[:5])
     np.testing.assert_allclose(ROBOT.limits.position_upper[first:], arm.upperPositionLimit[:5])
@@ -52,13 +52,13 @@ def test_the_arm_is_the_urdfs():
     for _ in range(20):
         q = rng.uniform(ROBOT.limits.position_lower, ROBOT.limits.position_upper)
         pin.framesForwardKinematics(arm, data, np.append(q[first:], 0.0))
-        hand = data.oMf[arm.getFrameId(ROBOT.end_effector.frame)]
+        hand = data.oMf[arm.getFrameId(ROBOT.hands[0].frame)]
         base = pin.SE3(pin.exp3(np.array([0.0, 0.0, q[2]])), np.array([q[0], q[1], 0.0]))
-        mount = pin.SE3(np.eye(3), np.array(ROBOT.mount.translation))
+        mount = pin.SE3(np.eye(3), np.array(ROBOT.arms[0].mount.translation))
         expected = base * mount * hand
         tool = MODEL.pose(q)
         np.testing.assert_allclose(tool.rotation, expected.rotation, atol=1e-9)
-        place = expected.act(np.array(ROBOT.end_effector.placement.translation))
+        place = expected.act(np.array(ROBOT.hands[0].placement.translation))
         np.testing.assert_allclose(tool.position, place, atol=1e-9)
 
 

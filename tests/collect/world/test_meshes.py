@@ -39,7 +39,7 @@ def test_a_mesh_elsewhere_or_of_no_numbers_is_one_line(name, tmp_path):
     (home / "text.stl").write_text("solid nothing")
     os.mkfifo(home / "pipe.stl")
     shutil.copy(ROBOTS.find("ridgeback_ur10").file, home / "robot.toml")
-    text = load_model("ridgeback_ur10").description.urdf.read_text()
+    text = load_model("ridgeback_ur10").description.arms[0].urdf.read_text()
     (home / "arm.urdf").write_text(re.sub('filename="package:[^"]*"', f'filename="{name}"', text))
     lines = (home / "robot.toml").read_text()
     (home / "robot.toml").write_text(re.sub("(?m)^urdf = .*", 'urdf = "arm.urdf"', lines))

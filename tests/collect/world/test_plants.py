@@ -59,7 +59,7 @@ def test_both_move_alike(build):
         for each in (robot, ideal):
             each.send(AHEAD * np.sin(0.1 * k))
     np.testing.assert_allclose(robot.state().q, ideal.state().q, atol=5e-3)
-    np.testing.assert_allclose(robot.tool.position, ideal.tool.position, atol=1e-2)
+    np.testing.assert_allclose(robot.tools[0].position, ideal.tools[0].position, atol=1e-2)
 
 
 def test_running_into_something_is_a_contact(build):

@@ -7,7 +7,6 @@ from collect_helpers import environment, hold, write_small_robot
 
 from handrail.collect.world.geometry import bounding_box
 from handrail.collect.world.gl import mujoco
-from handrail.collect.world.gripper import FINGERS
 from handrail.collect.world.meshes import PlacedMesh, placed_meshes
 from handrail.collect.world.robot import build_robot
 from handrail.collect.world.scene import Scene, SceneObject, box
@@ -42,8 +41,8 @@ def test_tool_pose_and_jacobian_are_pinocchios(model):
         J = np.zeros((6, compiled.nv))
         mujoco.mj_jacSite(compiled, data, J[:3], J[3:], compiled.site("tool").id)
         expected = model.pose(q)
-        np.testing.assert_allclose(simulation.tool.position, expected.position, atol=1e-6)
-        np.testing.assert_allclose(simulation.tool.rotation, expected.rotation, atol=1e-6)
+        np.testing.assert_allclose(simulation.tools[0].position, expected.position, atol=1e-6)
+        np.testing.assert_allclose(simulation.tools[0].rotation, expected.rotation, atol=1e-6)
         columns = [compiled.joint(name).dofadr[0] for name in model.joints]
         np.testing.assert_allclose(J[:, columns], model.jacobian(q), atol=1e-6)
 
@@ -56,7 +55,7 @@ def test_mass_matrix_is_pinocchios_plus_drives_gripper_and_chassis(model):
             body.mass, body.inertia = 1e-9, [1e-12] * 3
         for joint in body.joints:
             joint.armature = 0.0
-    for geom in FINGERS:
+    for geom in ("finger_left", "finger_right"):
         robot.geom(geom).mass = 0.0
     compiled = robot.compile()
     data = mujoco.MjData(compiled)
@@ -111,7 +110,7 @@ def test_collision_shapes_enclose_every_vertex_of_the_meshes(shipped):
 
 
 def test_fingers_stay_in_the_box_that_the_controller_avoids(shipped):
-    gripper = shipped.description.end_effector.gripper
+    gripper = shipped.description.hands[0].gripper
     assert gripper is not None
     placed = next(shape for shape in shipped.description.collision if shape.name == gripper.shape)
     assert placed.tool
@@ -120,7 +119,7 @@ def test_fingers_stay_in_the_box_that_the_controller_avoids(shipped):
         for _ in range(40):
             simulation.send(np.append(np.zeros(shipped.size), q_finger))
         frame = shipped.pose(simulation.state().q, placed.frame)
-        for name in FINGERS:
+        for name in ("finger_left", "finger_right"):
             geom = simulation.mujoco_model.geom(name)
             corners = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T * geom.size
             view = simulation.data.geom(name)
@@ -136,15 +135,15 @@ def test_a_gripper_that_does_not_grip_is_the_open_one(shipped):
     speed = 0.2 * model.description.limits.velocity * np.resize([1.0, -1.0], model.size)
     for options in ({}, {"grips": False}, {"grips": False, "timestep": 0.005}):
         simulation = Simulation(model, Scene(), home, 0.03, **options)
-        fingers = [simulation.data.geom(name).xpos.copy() for name in FINGERS]
+        fingers = [simulation.data.geom(name).xpos.copy() for name in ("finger_left", "finger_right")]
         for k in range(60):
             simulation.send(np.append(speed * min(k, 20, 59 - k) / 20, 1.0 if "grips" in options else 0.0))
-        fingers += [simulation.data.geom(name).xpos.copy() for name in FINGERS]
-        ends.append(np.array([*fingers, simulation.tool.position]))
+        fingers += [simulation.data.geom(name).xpos.copy() for name in ("finger_left", "finger_right")]
+        ends.append(np.array([*fingers, simulation.tools[0].position]))
     assert len(simulation.data.qpos) == model.size
-    assert simulation.opening == 1.0
+    assert simulation.openings[0] == 1.0
     with pytest.raises(HandrailError, match="grip of a simulation: expected none without grips"):
-        Simulation(model, Scene(), home, 0.03, grip=0.05, grips=False)
+        Simulation(model, Scene(), home, 0.03, grip=(0.05,), grips=False)
     moved = np.linalg.norm(ends[0][-1] - model.pose(home).position)
     assert moved > 0.1 * model.description.world.scale
     np.testing.assert_allclose(ends[1], ends[0], atol=5e-4)
@@ -177,23 +176,23 @@ def test_velocity_commands_are_tracked(robot):
 def test_fingers_close_and_open_at_their_speed(robot):
     with environment("Reach", robot=robot) as env:
         env.reset(seed=0)
-        gripper = env.model.description.end_effector.gripper
+        gripper = env.model.description.hands[0].gripper
         assert gripper is not None
         steps = int(np.ceil(gripper.stroke / gripper.speed * env.fps))
         hold(env, steps // 2, gripper=1.0)
-        assert 0.3 < env.simulation.opening < 0.7
+        assert 0.3 < env.simulation.openings[0] < 0.7
         hold(env, steps, gripper=1.0)
-        assert env.simulation.opening < 0.01
+        assert env.simulation.openings[0] < 0.01
         hold(env, 2 * steps)
-        assert env.simulation.opening > 0.99
+        assert env.simulation.openings[0] > 0.99
 
 
 def test_the_hand_opens_as_far_and_presses_as_hard_as_it_says(shipped):
     """Open it is one stroke wide; around a fixed bar each finger presses with the gripper's force."""
-    gripper, q = shipped.description.end_effector.gripper, np.array(shipped.description.home)
+    gripper, q = shipped.description.hands[0].gripper, np.array(shipped.description.home)
     assert gripper is not None
     simulation = Simulation(shipped, Scene(), q, 0.05)
-    left, right = (simulation.data.geom(name).xpos.copy() for name in FINGERS)
+    left, right = (simulation.data.geom(name).xpos.copy() for name in ("finger_left", "finger_right"))
     tool = shipped.pose(q)
     across = tool.rotation.T @ (right - left)
     if gripper.jaw is None:
@@ -201,7 +200,7 @@ def test_the_hand_opens_as_far_and_presses_as_hard_as_it_says(shipped):
         np.testing.assert_allclose(across / np.linalg.norm(across), [1.0, 0.0, 0.0], atol=1e-6)
     else:
         assert across[0] > 0.0
-        assert [tool_to_pad(simulation, name) for name in FINGERS] == pytest.approx(
+        assert [tool_to_pad(simulation, name) for name in ("finger_left", "finger_right")] == pytest.approx(
             [gripper.stroke / 2] * 2, abs=2e-4
         )
     bar = SceneObject("bar", box([0.03, 0.03, 0.03]), tool.position, tool.rotation)
@@ -209,10 +208,12 @@ def test_the_hand_opens_as_far_and_presses_as_hard_as_it_says(shipped):
     for _ in range(60):
         simulation.send(np.append(np.zeros(shipped.size), 1.0))
     if gripper.jaw is None:
-        assert simulation.opening * gripper.stroke == pytest.approx(0.03, abs=0.002)
+        assert simulation.openings[0] * gripper.stroke == pytest.approx(0.03, abs=0.002)
         force = simulation.data.actuator("gripper").force[0]
     else:
-        assert sum(tool_to_pad(simulation, name) for name in FINGERS) == pytest.approx(0.03, abs=0.005)
+        assert sum(
+            tool_to_pad(simulation, name) for name in ("finger_left", "finger_right")
+        ) == pytest.approx(0.03, abs=0.005)
         force = pressed(simulation, "finger_left")
         assert pressed(simulation, "finger_right") == pytest.approx(force, rel=0.2)
     assert abs(force) == pytest.approx(gripper.force, rel=0.02 if gripper.jaw is None else 0.25)
@@ -220,7 +221,7 @@ def test_the_hand_opens_as_far_and_presses_as_hard_as_it_says(shipped):
 
 def tool_to_pad(simulation: Simulation, finger: str) -> float:
     """Return how far it is from the tool point along its x axis to the inner face of a finger [m]."""
-    tool, side = simulation.tool, -1.0 if finger == "finger_left" else 1.0
+    tool, side = simulation.tools[0], -1.0 if finger == "finger_left" else 1.0
     pad, width = simulation.data.geom(finger), simulation.mujoco_model.geom(finger).size[0]
     normal = -side * pad.xmat.reshape(3, 3)[:, 0]
     face = pad.xpos + width * normal

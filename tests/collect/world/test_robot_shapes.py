@@ -92,12 +92,12 @@ def test_shapes_that_are_not_listed_never_meet(model):
 @lru_cache
 def meshes(model: RobotModel) -> tuple[pin.Model, pin.GeometryModel]:
     """Return the arm with the collision meshes of its URDF, other joints locked."""
-    described = model.description
+    described = model.description.arms[0]
     arm = pin.buildModelFromUrdf(str(described.urdf))
     geometry = pin.buildGeomFromUrdf(
         arm, str(described.urdf), pin.COLLISION, package_dirs=[str(described.mesh_root)]
     )
-    locked = [arm.getJointId(name) for name in list(arm.names)[1:] if name not in described.arm_joints]
+    locked = [arm.getJointId(name) for name in list(arm.names)[1:] if name not in described.joints]
     return pin.buildReducedModel(arm, geometry, locked, pin.neutral(arm))
 
 

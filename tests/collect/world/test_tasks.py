@@ -145,7 +145,7 @@ def test_a_grasped_cube_stays_through_lifting_driving_and_turning():
 
         drive(25, 0.0)
         held = slip()
-        assert 0.4 < env.simulation.opening < 0.7
+        assert 0.4 < env.simulation.openings[0] < 0.7
         for _ in range(40):
             J = env.model.jacobian(env.state().q)[:, 3:]
             lift = np.linalg.lstsq(J, np.array([0, 0, 0.1, 0, 0, 0.0]), rcond=None)[0]

@@ -117,7 +117,7 @@ def test_the_tray_has_to_be_left_on_the_table(grip, success):
         on_it = place + tray.rotation.T @ (can.position - tray.position)
         scene = moved(start, "tray", place).scene
         scene = moved(Start(scene, start.q), "can", on_it).scene
-        env.reset(options={"start": Start(scene, start.q, grip=grip)})
+        env.reset(options={"start": Start(scene, start.q, grip=(grip,))})
         info = hold(env, 40, float(grip is not None))
         assert info["is_success"] == success, info
 

@@ -143,7 +143,7 @@ def test_no_column_is_ever_infinite(number):
     channels = ("base.vx", "ee.vx", "joint.a")
     bad = np.full(3, number)
     raw = RawInput(bad, age=number, round_trip=number)
-    intent = Intent(bad, np.array([True, False, True]), gripper=number, raw=raw)
+    intent = Intent(bad, np.array([True, False, True]), grippers=(number,), raw=raw)
     diagnostics = Diagnostics(Status.INVALID_STATE, slack=abs(number))
     still = np.zeros(2)
     frame = Frame(still, np.zeros(1), {}, intent, still, still, diagnostics, 0, False, False, 0.0, 0, 1)

@@ -85,7 +85,7 @@ def moved(columns, shift, angle):
     for at in (7, 13):  # bin, obstacle_0
         environment[:, at : at + 2] = environment[:, at : at + 2] @ flat.T + shift
     environment[:, 10:12] = environment[:, 10:12] @ flat.T
-    values, start = out["teleop.values"], CHANNELS.tool_slice.start
+    values, start = out["teleop.values"], CHANNELS.hand_slice().start
     for at in (start, start + 3, CHANNELS.joint_slice.start):
         values[:, at : at + 2] = values[:, at : at + 2] @ flat.T
     return out
@@ -149,7 +149,7 @@ def test_intent_comes_back(masks):
         intent = interface.decode(action, columns["observation.state"][t])
         np.testing.assert_allclose(intent.values, columns["teleop.values"][t, :-1], atol=1e-5)
         assert intent.mask.tolist() == columns["teleop.mask"][t, :-1].tolist()
-        assert intent.gripper == columns["teleop.values"][t, -1]
+        assert intent.grippers == (columns["teleop.values"][t, -1],)
 
 
 def test_realised_is_the_next_velocity():

@@ -24,7 +24,7 @@ def state(tool, cube=CUBE.position, opening=1.0):
     """A moment of `pick_place` with tool and cube anywhere."""
     poses = {each.name: Pose(each.position, each.rotation) for each in START.scene.objects}
     poses["cube"] = Pose(np.asarray(cube, float), CUBE.rotation)
-    return TaskState(0.0, Pose(np.asarray(tool, float), np.eye(3)), opening, START, poses)
+    return TaskState(0.0, (Pose(np.asarray(tool, float), np.eye(3)),), (opening,), START, poses)
 
 
 AWAY = state(CUBE.position + 0.5 * UP)
@@ -76,7 +76,7 @@ def test_a_hand_that_was_at_the_goal_had_only_to_turn():
 
     def at(away, turned):
         tool = Pose(start.goal.position + away * UP, start.goal.rotation @ pin.exp3(turned * UP))
-        return TaskState(0.0, tool, 1.0, start, {})
+        return TaskState(0.0, (tool,), (1.0,), start, {})
 
     far, near, there = at(0.11, 0.0), at(0.09, 1.0), at(0.09, 0.4)
     assert [task.stage(moment) for moment in (far, near)] == list(task.stages)

@@ -92,7 +92,7 @@ def test_plain_loading_acts_as_the_interface_does(checkpoint):
         acted.append(ours.act(*ours.meta.interface.observe(state, environment)))
         meant = ours.meta.interface.decode(acted[-1], state)
         np.testing.assert_array_equal(theirs[:-1], meant.values[meant.mask])
-        assert theirs[-1] == meant.gripper
+        assert theirs[-1] == meant.grippers[0]
     assert not np.array_equal(acted[0], acted[1])  # the next of the chunk
     ours.reset()
     np.testing.assert_array_equal(ours.act(*ours.meta.interface.observe(state, environment)), acted[0])

@@ -28,7 +28,7 @@ CHANNELS = Channels.of(MODEL.description)
 
 def intent(twist, time: float = 0.0) -> Intent:
     values = np.zeros(CHANNELS.size)
-    values[CHANNELS.tool_slice] = twist
+    values[CHANNELS.hand_slice()] = twist
     return Intent(values, CHANNELS.mask("ee"), time=time)
 
 

@@ -55,7 +55,7 @@ def test_a_key_moves_the_hand(operator):
     assert intent.mode == "ee"
     assert intent.time == 1.0
     assert np.array_equal(intent.mask, operator.meaning.channels.mask("ee"))
-    assert intent.values[operator.meaning.channels.tool_slice][0] == pytest.approx(0.6 * 0.35)
+    assert intent.values[operator.meaning.channels.hand_slice()][0] == pytest.approx(0.6 * 0.35)
     assert intent.raw.values[3] == 1.0
     assert intent.raw.axes == 1
 
@@ -138,7 +138,7 @@ def test_the_hand_moves_as_the_page_looks(operator):
     begin(operator)
     drive(operator, ee_vx=1.0)
     operator.inputs = replace(operator.inputs, view=np.pi / 2)
-    tool = operator.act(view()).values[operator.meaning.channels.tool_slice]
+    tool = operator.act(view()).values[operator.meaning.channels.hand_slice()]
     assert tool[:3] == pytest.approx([0.0, 0.21, 0.0], abs=1e-9)
 
 

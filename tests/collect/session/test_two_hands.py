@@ -1,0 +1,72 @@
+"""A robot with two hands does tasks with either; each grasps for itself, and a recording names both."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES
+from handrail.collect.operators.person.meaning import InputMeaning
+from handrail.collect.session.build import build_env, build_session, session_features
+from handrail.collect.world.observation import from_numbers, to_numbers
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+
+ROBOT = str(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
+TOOLS = ("left.tool", "right.tool")
+
+
+class Watcher:
+    def begin(self, env, seed):
+        self.frames = []
+
+    def see(self, frame):
+        self.frames.append(frame)
+
+
+@pytest.mark.parametrize("hand", ["left", "right"])
+def test_either_hand_reaches(hand):
+    config = SessionConfig(task="reach", robot=ROBOT, hand=hand)
+    env, watcher = build_env(config, 20), Watcher()
+    outcome = build_session(config, env, (watcher,)).run(1)
+    assert outcome.success
+    assert outcome.contact_onsets == 0
+    features = session_features(env)
+    assert features["action"].names[-2:] == ("left.gripper", "right.gripper")
+    assert {f"{tool}.x" for tool in TOOLS} < set(features["observation.state"].names)
+    frame = watcher.frames[-1]
+    channels = Channels.of(env.model.description)
+    np.testing.assert_array_equal(frame.intent.mask, channels.mask(hand))
+    assert frame.action.shape == features["action"].shape == (22,)
+    assert frame.state.shape == features["observation.state"].shape
+
+
+def test_what_a_hand_holds_moves_with_it():
+    """And comes through an environment's numbers with its hand; the other hand's gripper is open."""
+    env = build_env(SessionConfig(task="tray", robot=ROBOT, hand="right"), 20)
+    env.reset(seed=0)
+    closed = np.append(np.zeros(env.model.size), [0.0, 1.0])
+    for _ in range(5):
+        env.step(closed)
+    (held,) = env.plant.held()
+    assert held.frame == "right.tool"
+    left, right = env.plant.openings
+    assert left == pytest.approx(1.0)
+    assert right < 0.8
+    obstacles = env.obstacles()
+    again = from_numbers(to_numbers(obstacles, TOOLS), TOOLS)
+    assert [each.frame for each in again] == [each.frame for each in obstacles]
+    with pytest.raises(HandrailError, match="held by hand 1 to 1"):
+        from_numbers(to_numbers(obstacles, TOOLS))
+    before = env.plant.tools[1]
+    np.testing.assert_allclose(env.task_state().tool.position, before.position)
+    assert env.task_state().opening == right
+
+
+def test_a_hand_that_is_not_there_and_a_person_are_refused_in_a_line():
+    with pytest.raises(HandrailError, match="unknown hand 'third': expected one of left, right"):
+        build_env(SessionConfig(robot=ROBOT, hand="third"), 20)
+    env = build_env(SessionConfig(robot=ROBOT), 20)
+    with pytest.raises(HandrailError, match="expected a robot with one hand where a person steers"):
+        InputMeaning(env.model, MODES["ee"])
