@@ -204,10 +204,10 @@ class Encoder:
             parts = np.split(said, np.cumsum(self.reads.sizes)[:-1], axis=1)
             for (name, _, _), each in zip(self.reads.objects, parts, strict=True):
                 d, ray, width = (of.numpy() for of in placed(torch.from_numpy(each), slope, camera.size))
-                way = np.einsum("tij,tj->ti", turn, d)
+                way, rays = (np.einsum("tij,tj->ti", turn, of) for of in (d, ray))
                 m, r = each[:, PLACED:-1], each[:, -1]
                 turned = (turn @ facing(ray) @ orthonormal(m), widths(r)) if m.size else ()
-                found[name].append(Said(pose.tool, place + way, spread(way, width), *turned))
+                found[name].append(Said(pose.tool, place + way, spread(rays, width), *turned))
         return found
 
 

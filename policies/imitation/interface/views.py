@@ -2,8 +2,7 @@
 
 n ∝ (a s u, −s v, −1)                       the ray through a place, u to the right, v down, −1 to 1,
 p = c + ρ R n                               of a camera at c with axes R; s = tan(fovy / 2), a = w / h
-Σ = 4 (σ_l² (1 − n nᵀ) + σ_d² n nᵀ)         how far off that is: across the ray, along it;
-    + (σ_c² + (α ρ)²) 1                     and a camera may be a bit beside its place, and turned
+Σ = 4 (σ_l² (1 − n nᵀ) + σ_d² n nᵀ)         how far off that is: across the ray, along it
 """
 
 from dataclasses import dataclass
@@ -23,7 +22,6 @@ from handrail.policies.imitation.interface.relative import RobotPose
 
 _FINEST = 2e-3  # how far something is off at least [m]
 _SPREAD = 4.0  # variance over σ², of a density ∝ e^(−|e| / σ) in space
-_BESIDE, _TURNED = 0.01, 0.03  # σ_c, α of a camera [m, rad]
 _RIGID = 1e-5  # [m, 1]
 PLACED = 5  # numbers: u, v, log ρ, log σ_l, log σ_d
 
@@ -99,13 +97,11 @@ def in_picture(place: Tensor, slope: Tensor, size: tuple[int, int]) -> Tensor:
     return torch.stack([place[:, 0] / depth * (size[0] / size[1]), -place[:, 1] / depth], 1)
 
 
-def spread(ways: FloatArray, widths: FloatArray) -> FloatArray:
-    """Return Σ, (T, 3, 3), of ways ρ n, (T, 3), of log σ_l and log σ_d, (T, 2)."""
+def spread(rays: FloatArray, widths: FloatArray) -> FloatArray:
+    """Return Σ, (T, 3, 3), along rays, (T, 3), of log σ_l and log σ_d, (T, 2)."""
     across, along = np.maximum(np.exp(2.0 * widths), _FINEST**2).T[..., None, None]
-    squared = np.sum(ways**2, axis=1)[:, None, None]
-    outer = ways[:, :, None] * ways[:, None, :] / squared
-    beside = (_BESIDE**2 + _TURNED**2 * squared) * np.eye(3)
-    return _SPREAD * (across * (np.eye(3) - outer) + along * outer) + beside
+    outer = rays[:, :, None] * rays[:, None, :]
+    return _SPREAD * (across * (np.eye(3) - outer) + along * outer)
 
 
 def _frame(pose: RobotPose, on: str) -> tuple[FloatArray, FloatArray]:

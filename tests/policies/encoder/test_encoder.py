@@ -291,7 +291,7 @@ def test_a_place_in_two_pictures_is_a_place_in_space():
         np.testing.assert_allclose(ray[0], way / np.linalg.norm(way), atol=1e-6)
         again = in_picture(torch.from_numpy(d), torch.tensor([mount.slope], dtype=torch.float64), SIZE)
         np.testing.assert_allclose(again[0], [u, v], atol=1e-6)
-        off = spread(d @ turn.T, width)
+        off = spread(ray @ turn.T, width)
         seen.append(Said(pose.tool, place + d @ turn.T, off, np.eye(3)[None], np.ones(1)))
     others = {name: said([0.0, 0.0, 0.0]) for name in ("bin", "cube_table", "bin_table")}
     memory = SceneMemory(reads())
