@@ -124,7 +124,7 @@ def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str 
         return build(model, 1.0 / fps)
     channels = Channels.of(model.description)
     make = TASKS.find(task).objectives if task and mode.task_objectives else None
-    of_task = resolved(make)(channels) if make else ()
+    of_task = resolved(make)(channels, model.number) if make else ()
     centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
     pair = (together(channels),) if channels.pair else ()
     return build(model, 1.0 / fps, (*of_task, *centring, *pair))

@@ -23,13 +23,13 @@ def split_controller(model: RobotModel, period: float = 0.05) -> ReactiveControl
         period: of the control loop [s].
     """
     channels, arm = Channels.of(model.description), ArmCompletion(model)
-    understood = channels.mask(*(("base",) if channels.base else ()), "ee")
+    understood = channels.mask(*(("base",) if channels.base else ()), model.hand.name or "ee")
 
     def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         base = base_velocity(intent, channels, state.q)
-        if not intent.mask[channels.hand_slice()].any():
+        if not intent.mask[channels.hand_slice(model.number)].any():
             return np.concatenate([base, np.zeros(model.size - len(base))])
-        twist = tool_twist(intent, channels, model.pose(state.q))
+        twist = tool_twist(intent, channels, model.pose(state.q), model.number)
         return arm.velocity(state.q, previous, base, twist, period)
 
     return ReactiveController(model, ask, period, understood=understood)

@@ -86,10 +86,10 @@ def twist_controller(
     def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         if not intent.mask.any():
             return np.zeros(model.size)
-        twist = tool_twist(intent, channels, model.pose(state.q))
+        twist = tool_twist(intent, channels, model.pose(state.q), model.number)
         return complete(state.q, previous, twist, period)
 
-    return ReactiveController(model, ask, period, intent_timeout, channels.mask("ee"))
+    return ReactiveController(model, ask, period, intent_timeout, channels.mask(model.hand.name or "ee"))
 
 
 def least_squares_controller(model: RobotModel, period: float = 0.05) -> ReactiveController:

@@ -21,7 +21,7 @@ class Stage:
     u: ca.SX  # acceleration during it, (n, 1)
 
     def pose(self, frame: str = "") -> SymbolicPose:
-        """Return pose and Jacobian of a frame as expressions of q; of the first hand's tool by default."""
+        """Return pose and Jacobian of a frame as expressions of q; of the hand's tool by default."""
         return symbolic_pose(self.model, self.q, frame)
 
     def tool(self, hand: int = 0) -> SymbolicPose:

@@ -16,7 +16,7 @@ class TaskSpec:
     script: Callable[..., Any] | str  # what a scripted person does, `(model, gains, drives) -> Script`
     help: str  # one line
     objectives: Callable[..., Any] | str | None = None
-    """What the masked MPC looks after by itself, `(channels) -> (Objective, …)`; None: nothing."""
+    """What the masked MPC looks after by itself, `(channels, hand) -> (Objective, …)`; None: nothing."""
     released_channels: tuple[str, ...] = ()  # channels of the tool that the operator leaves to them
     owned_channels: tuple[str, ...] = ()
     """Channels that an operator who drives the base by itself keeps nevertheless."""

@@ -137,6 +137,6 @@ def _sample_can(on: SceneObject, rng: np.random.Generator) -> SceneObject:
     return can("can", on.position + on.rotation @ offset, _RADIUS, _HEIGHT, _CAN_MASS)
 
 
-def level_tray(channels: Channels) -> tuple[Objective, ...]:
+def level_tray(channels: Channels, hand: int) -> tuple[Objective, ...]:
     """Return what the masked MPC minds while the operator carries the tray: that it is level."""
-    return (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=_LEVEL),)
+    return (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=_LEVEL, hand=hand),)

@@ -42,6 +42,13 @@ def test_either_hand_reaches(hand):
     assert frame.state.shape == features["observation.state"].shape
 
 
+@pytest.mark.parametrize(("task", "mode"), [("tray", "ee"), ("reach", "ee_dls"), ("reach", "decoupled")])
+def test_objectives_and_completions_are_of_the_hand_that_does_it(task, mode):
+    """The second hand: what is meant for the first would leave its tray to tilt, and the hand where it is."""
+    config = SessionConfig(task=task, mode=mode, robot=ROBOT, hand="right")
+    assert build_session(config, build_env(config, 20)).run(0).success
+
+
 def test_what_a_hand_holds_moves_with_it():
     """And comes through an environment's numbers with its hand; the other hand's gripper is open."""
     env = build_env(SessionConfig(task="tray", robot=ROBOT, hand="right"), 20)
