@@ -28,6 +28,20 @@ class Named(Protocol):
         ...
 
 
+class Handed(Protocol):
+    """A spec that asks hands of a robot."""
+
+    @property
+    def hands(self) -> int:
+        """How many it needs."""
+        ...
+
+
+def fitting[Spec: Handed](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]:
+    """Return those of some specs that a robot with so many hands can do, by name."""
+    return {name: spec for name, spec in specs.items() if spec.hands <= hands}
+
+
 class Registry[Spec: Named](Mapping[str, Spec]):
     """Specs by name: what comes with Handrail, then what installed packages add by entry points.
 

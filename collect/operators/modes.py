@@ -24,6 +24,7 @@ class TeleopMode:
     task_objectives: bool = True
     """Whether the masked MPC takes on the objectives that a task brings, and the channels that the
     operator then leaves to them."""
+    hands: int = 1  # how many hands a robot needs for it
 
     def owned(self, focus: Focus, hand: str = "") -> tuple[str, ...]:
         """Return the channel groups that the operator owns; `hand` is the one of several that is meant."""
@@ -40,13 +41,15 @@ class TeleopMode:
         """Return the mode of an operator who releases some tool channels, and owns some more while driving.
 
         Args:
-            released: channels of the tool that the group `hand` loses; a mode that names channels keeps them.
+            released: channels of the tool that the groups `hand` and `pair` lose; a mode that names channels
+                keeps them.
             owned: channels that are owned too while the operator, who steers by focus, drives the base.
         """
         kept = tuple(name for name in TOOL if name not in released)
+        parts = {"hand": kept, "pair": tuple(name.replace("ee.", "pair.") for name in kept)}
 
         def groups(focus: Focus) -> tuple[str, ...]:
-            own = (name for group in self.groups(focus) for name in (kept if group == "hand" else (group,)))
+            own = (name for group in self.groups(focus) for name in parts.get(group, (group,)))
             return (*own, *(owned if self.by_focus and focus == "base" else ()))
 
         return replace(self, groups=groups) if released or owned else self
@@ -135,6 +138,21 @@ MODES = Registry(
             base_or_hand,
             "split",
             "drive the base, or steer the hand by the arm's inverse kinematics alone",
+        ),
+        TeleopMode("both", always("ee"), "mpc", "steer all hands at once, each by itself", hands=2),
+        TeleopMode(
+            "pair",
+            always("pair"),
+            "mpc",
+            "steer two hands as one, which stay as they are to each other",
+            hands=2,
+        ),
+        TeleopMode(
+            "hand+torso",
+            always("hand", "torso"),
+            "mpc",
+            "steer the hand and the joints that carry all arms",
+            hands=2,
         ),
     ),
 )

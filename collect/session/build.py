@@ -25,7 +25,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.objectives.together import together
-from handrail.controllers.registry import resolved
+from handrail.controllers.registry import fitting, resolved
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import frame_features
@@ -53,10 +53,11 @@ def build_env(
     """
     config.check()
     check_fps(fps)
-    task = build_task(config)
+    task, model = build_task(config), load_model(config.robot)
+    model.description.check_hands(f"task {config.task}", TASKS.find(config.task).hands)
     return HandrailEnv(
         task,
-        load_model(config.robot).with_hand(config.hand),
+        model.with_hand(config.hand),
         fps=config.robot_fps or fps,
         plant=plant or (Simulation if config.physics else IdealRobot),
         real=plant is not None,
@@ -136,6 +137,7 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
     With the mask of the command line if there is one, on velocity sticks.
     """
     mode, task = MODES.find(config.mode), TASKS.find(config.task)
+    model.description.check_hands(f"mode {mode.name}", mode.hands)
     if config.mask:
         own = mode_of_mask(config.mask, Channels.of(model.description), mode.controller)
         mode = replace(own, task_objectives=mode.task_objectives)
@@ -145,8 +147,9 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
 
 
 def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:
-    """Return the modes that a person can change to, by name: all that there are, and that of the settings."""
-    modes = (build_mode(replace(config, mode=name, mask=""), env.model) for name in MODES)
+    """Return the modes that a person can change to, by name: all for the robot, and that of the settings."""
+    fit = fitting(MODES, len(env.model.description.hands))
+    modes = (build_mode(replace(config, mode=name, mask=""), env.model) for name in fit)
     return {mode.name: mode for mode in (build_mode(config, env.model), *modes)}
 
 

@@ -12,6 +12,7 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, shown, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import Count, Name, Number, Text
 
 DEMO_NOTE = "demo data: no people took part"
@@ -126,6 +127,12 @@ class UserStudy:
             for name in names:
                 if name not in choices:
                     raise unknown_name(thing, name, choices)
+        description = load_description(self.robot)
+        for name, spec in (
+            *((f"mode {name}", MODES[name]) for name in self.modes),
+            *((f"task {name}", TASKS[name]) for name in self.tasks),
+        ):
+            description.check_hands(name, spec.hands)
         if not (self.modes and self.tasks):
             raise HandrailError("modes and tasks: expected one or more of each, got none")
         if {"tlx", "tlx_raw"} <= set(self.forms):

@@ -103,6 +103,10 @@ class Channels:
         groups = {kind: tuple(own) for kind, own in groupby(self.names, _kind)}
         groups["ee"] = tuple(name for hand in self.hands for name in hand)
         groups["arm"] = self.joints[len(self.base) :]
+        if len(self.hands) > 1:
+            carry = np.sum([self.moving(hand) for hand in range(len(self.hands))], axis=0) > 1
+            carry[: len(self.base)] = False
+            groups["torso"] = tuple(np.array(self.joints)[carry].tolist())
         for hand, names in enumerate(self.hands if len(self.hands) > 1 else ()):
             others = [self.moving(other) for other in range(len(self.hands)) if other != hand]
             own = self.moving(hand) & ~np.any(others, axis=0)
@@ -112,9 +116,9 @@ class Channels:
     def mask(self, *names: str) -> BoolArray:
         """Return the mask of some channels, by name or by group, (m,).
 
-        Groups are `base`, `ee` (all hands), `joint`, `arm` (the joints that are not the base's), and with two
-        hands `pair`, `apart`, and of each by its name its twist and the joints of its arm alone: `left`,
-        `left.arm`.
+        Groups are `base`, `ee` (all hands), `joint`, `arm` (the joints that are not the base's), with several
+        hands `torso` (joints that move more than one), of each by its name its twist and the joints of its
+        arm alone (`left`, `left.arm`), and with two `pair` and `apart`.
         """
         mask = np.zeros(self.size, dtype=bool)
         for name in names:

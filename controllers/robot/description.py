@@ -80,6 +80,13 @@ class RobotDescription:
         chains = [set(chain(self.arms, hand.frame)) | set(self.base.joints) for hand in self.hands]
         return tuple(tuple(joint in moving for joint in self.joints) for moving in chains)
 
+    def check_hands(self, what: str, needed: int) -> None:
+        """Check that the robot has as many hands as something needs, such as `mode both`."""
+        if len(self.hands) < needed:
+            raise HandrailError(
+                f"{what}: expected a robot with {needed} hands, got {self.name} with {len(self.hands)}"
+            )
+
     @property
     def camera_names(self) -> tuple[str, ...]:
         """Names of the cameras that can be recorded: its own, and one that overlooks the scene."""

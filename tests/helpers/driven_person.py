@@ -20,6 +20,7 @@ from handrail.collect.operators.person.person import Person
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.registry import fitting
 from handrail.controllers.robot.model import Pose, load_model
 
 MODEL = load_model()
@@ -40,7 +41,7 @@ class Driven:
 
     def __init__(self, device, mode="ee", beside="", follower=None):
         self.clock = Clock()
-        self.person = Person(MODEL, dict(MODES), mode, self.clock)
+        self.person = Person(MODEL, fitting(MODES, 1), mode, self.clock)
         self.person.ask(Ask("frame", "base"))
         controls = load_map(device, CONTROLS[device]) if device in CONTROLS else ControlMap({}, {})
         self.main, self.beside = PlayedReader(device, self.clock, controls), None

@@ -21,6 +21,7 @@ class TaskSpec:
     owned_channels: tuple[str, ...] = ()
     """Channels that an operator who drives the base by itself keeps nevertheless."""
     movers: bool = False  # whether obstacles can move in it: the class has `moving_obstacles`
+    hands: int = 1  # how many hands a robot needs for it
 
 
 _TASKS, _SCRIPTS = "handrail.collect.world.tasks", "handrail.collect.operators.scripted"

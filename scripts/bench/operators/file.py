@@ -10,6 +10,8 @@ from handrail.collect.flags import check_names, check_page, names
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.registry import fitting
+from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import AtLeastOne, Count, check_settings
 from handrail.controllers.versions import SIMULATION
 from handrail.datasets.lists import Names
@@ -43,12 +45,16 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
     @property
     def task_names(self) -> tuple[str, ...]:
         """The tasks asked for."""
-        return names(self.tasks, TASKS)
+        return names(self.tasks, fitting(TASKS, self._hands))
 
     @property
     def mode_names(self) -> tuple[str, ...]:
         """The modes asked for."""
-        return names(self.modes, MODES)
+        return names(self.modes, fitting(MODES, self._hands))
+
+    @property
+    def _hands(self) -> int:
+        return len(load_description(self.robot).hands)
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller, build_env, build_modes
 from handrail.collect.session.mode_controller import ModeController
 from handrail.controllers.interface.channels import Channels
@@ -27,7 +26,7 @@ def test_no_change_of_mode_jolts(env):
     channels, limits = Channels.of(model.description), model.description.limits
     rng = np.random.default_rng(0)
     controller.reset(env.obstacles())
-    names, before, fastest = list(MODES), np.zeros(model.size), 0.0
+    names, before, fastest = list(modes), np.zeros(model.size), 0.0
     for step in range(66):
         mode = modes[names[step // 3 % len(names)]]
         mask = channels.mask(*mode.owned("hand"))

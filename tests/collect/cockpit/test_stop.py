@@ -19,6 +19,7 @@ from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import STILLS, Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.controllers.interface.controller import State
+from handrail.controllers.registry import fitting
 from handrail.controllers.robot.model import load_model
 
 HELD = [1.0] * 18
@@ -85,7 +86,7 @@ class Robot:
     def __init__(self, recording):
         self._pipe, self._now = recording, time.monotonic()
         model = load_model()
-        self.person = Person(model, dict(MODES), "ee", lambda: self._now)
+        self.person = Person(model, fitting(MODES, 1), "ee", lambda: self._now)
         q = np.array(model.description.home)
         self._view = View(State(q, np.zeros(model.size), 0.0), None)
         self.person.reset(self._view, np.random.default_rng(0))

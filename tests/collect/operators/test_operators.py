@@ -26,11 +26,12 @@ from handrail.collect.world.tasks.drawer import HANDLE, Drawer, handle_rotation,
 from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.controller import State
+from handrail.controllers.registry import fitting
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose, load_model
 
 MODEL = load_model()
-STICKS = sorted(name for name, mode in MODES.items() if mode.device == "sticks")
+STICKS = sorted(name for name, mode in fitting(MODES, 1).items() if mode.device == "sticks")
 HOME = MODEL.description.home
 
 

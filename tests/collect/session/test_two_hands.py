@@ -8,7 +8,7 @@ import pytest
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.person.meaning import InputMeaning
-from handrail.collect.session.build import build_env, build_session, session_features
+from handrail.collect.session.build import build_env, build_mode, build_modes, build_session, session_features
 from handrail.collect.world.observation import from_numbers, to_numbers
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
@@ -42,7 +42,17 @@ def test_either_hand_reaches(hand):
     assert frame.state.shape == features["observation.state"].shape
 
 
-@pytest.mark.parametrize(("task", "mode"), [("tray", "ee"), ("reach", "ee_dls"), ("reach", "decoupled")])
+@pytest.mark.parametrize(
+    ("task", "mode"),
+    [
+        ("tray", "ee"),
+        ("reach", "ee_dls"),
+        ("reach", "decoupled"),
+        ("reach", "both"),
+        ("reach", "pair"),
+        ("reach", "hand+torso"),
+    ],
+)
 def test_objectives_and_completions_are_of_the_hand_that_does_it(task, mode):
     """The second hand: what is meant for the first would leave its tray to tilt, and the hand where it is."""
     config = SessionConfig(task=task, mode=mode, robot=ROBOT, hand="right")
@@ -69,6 +79,19 @@ def test_what_a_hand_holds_moves_with_it():
     before = env.plant.tools[1]
     np.testing.assert_allclose(env.task_state().tool.position, before.position)
     assert env.task_state().opening == right
+
+
+def test_a_mode_of_two_hands_is_only_for_robots_that_have_them():
+    one, two = (build_env(SessionConfig(robot=robot), 20) for robot in ("lekiwi", ROBOT))
+    added = {*build_modes(SessionConfig(), two)} - {*build_modes(SessionConfig(), one)}
+    assert added == {"both", "pair", "hand+torso"}
+    with pytest.raises(HandrailError, match="mode pair: expected a robot with 2 hands, got lekiwi with 1"):
+        build_mode(SessionConfig(mode="pair"), one.model)
+    channels = Channels.of(two.model.description)
+    for mode, masked in (("both", 12), ("pair", 6), ("hand+torso", 7)):
+        assert channels.mask(*MODES[mode].owned("hand", "left")).sum() == masked
+    steered = MODES["pair"].leaving(("ee.wx", "ee.wy"), ()).owned("hand", "left")
+    assert steered == ("pair.vx", "pair.vy", "pair.vz", "pair.wz")
 
 
 def test_a_hand_that_is_not_there_and_a_person_are_refused_in_a_line():

@@ -11,6 +11,7 @@ from handrail.collect.operators.person.inputs import Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
+from handrail.controllers.registry import fitting
 from handrail.controllers.robot.model import load_model
 
 MODEL = load_model()
@@ -20,7 +21,7 @@ CLOCK = [100.0]
 @pytest.fixture
 def operator():
     CLOCK[0] = 100.0
-    made = Person(MODEL, dict(MODES), "ee", lambda: CLOCK[0])
+    made = Person(MODEL, fitting(MODES, 1), "ee", lambda: CLOCK[0])
     made.reset(view(), np.random.default_rng(0))
     return made
 
