@@ -9,7 +9,7 @@ from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.summary import CHATTERING, UNKNOWN, summarize
 from handrail.datasets.quality.worst import Ranked
 
-_QUALITY = ("episode", "mode", "length [s]", "smoothness", *CHATTERING)
+_QUALITY = ("episode", "mode", "length [s]", "smoothness")
 
 
 def summary_table(root: Path) -> Table:
@@ -33,8 +33,10 @@ def quality_table(root: Path) -> Table:
         "rate of change and high-frequency content of the commanded velocities; "
         "corrections of joints that were commanded one by one, switched on or off"
     )
-    lines = [[row.cells()[name] for name in _QUALITY] for row in summarize(root)]
-    return Table(_QUALITY, lines, caption=caption)
+    rows = [row.cells() for row in summarize(root)]
+    hands = [name for name in rows[0] if name.startswith("smoothness,")] if rows else []
+    headings = (*_QUALITY, *hands, *CHATTERING)
+    return Table(headings, [[row[name] for name in headings] for row in rows], caption=caption)
 
 
 def worst_table(root: Path, metric: Metric, worst: Sequence[Ranked]) -> Table:

@@ -10,7 +10,6 @@ from scipy import stats
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.collection import shared_seeds
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measurements
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.statistics.contrast import Contrast, Estimate, adjusted, contrast
@@ -33,7 +32,9 @@ def differences(
     (base,) = [group for group in groups if group.label == baseline]
     others = [group for group in groups if group is not base]
     return adjusted(
-        _difference(metric, group, base, measurements, rng) for group in others for metric in METRICS
+        _difference(metric, group, base, measurements, rng)
+        for group in others
+        for metric in measurements.metrics
     )
 
 

@@ -5,6 +5,7 @@ What is better is always right.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ TURNED = "↓"  # marks a metric of which less is better, drawn the other way ro
 _WIDEST = 4.0  # standard deviations that are shown
 _SHOWN = 50  # paths a group
 _FAILED = "#b8bec6"
+_STYLES = {"solid": "-", "dashed": "--", "dotted": ":", "dash-dotted": "-."}  # of the hands' paths
 
 
 def answer_panels(comparison: Comparison) -> list[Panel]:
@@ -185,11 +187,12 @@ def _has_motion(group: Group) -> bool:
 def _paths(group: Group, colour: str) -> Panel:
     axes = new_figure(_WIDTH, 2.6).subplots()
     for episode in each_opened(group.episodes[:_SHOWN]):
-        motion = episode.motion
-        x, y = motion[:, 0], motion[:, 1] if motion.shape[1] > 1 else np.zeros(len(motion))
         line = _FAILED if episode.success is False else colour
-        axes.plot(x, y, color=line, lw=1.0, alpha=0.7)
-        axes.plot(x[-1], y[-1], "o", color=line, ms=3)
+        for hand, style in zip(episode.hands or ("",), cycle(_STYLES.values())):
+            motion = (episode.of_hand(hand) if hand else episode).motion
+            x, y = motion[:, 0], motion[:, 1] if motion.shape[1] > 1 else np.zeros(len(motion))
+            axes.plot(x, y, color=line, lw=1.0, alpha=0.7, ls=style)
+            axes.plot(x[-1], y[-1], "o", color=line, ms=3)
     (first,) = each_opened(group.episodes[:1])
     names = ("tool x [m]", "tool y [m]") if first.motion_is_tool else _first_names(first)
     axes.set(xlabel=short(names[0], _AXIS_LABEL), ylabel=short(names[1], _AXIS_LABEL))
@@ -197,7 +200,8 @@ def _paths(group: Group, colour: str) -> Panel:
         axes.set_aspect("equal", adjustable="box")
     tidy(axes)
     failed = ", grey: failed" if any(e.success is False for e in group.episodes) else ""
-    return Panel(f"{group.label}: paths", axes.figure, f"dot: end{failed}")
+    hands = "".join(f", {style}: {hand}" for hand, style in zip(first.hands, cycle(_STYLES)))
+    return Panel(f"{group.label}: paths", axes.figure, f"dot: end{failed}{hands}")
 
 
 def _first_names(episode: Demonstration) -> tuple[str, str]:

@@ -8,7 +8,6 @@ from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.policies import Outcomes
 from handrail.datasets.comparison.report import sentence
 from handrail.datasets.presentation.wording import number, percent, percent_span
-from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.contrast import SHARE, Contrast, Value
 
 _MOST = 3  # differences that are named; the tables have all
@@ -51,7 +50,7 @@ def _told(contrasts: Sequence[Contrast], values: Mapping[str, Value]) -> Iterato
 def cautions(comparison: Comparison) -> dict[str, bool]:
     """Return what limits the headline, and whether it does."""
     groups, differences = comparison.everything.groups, comparison.everything.differences
-    moving = [metric.name for metric in METRICS if metric.needs in ("motion", "position")]
+    moving = [each.name for each in comparison.everything.measurements.metrics if each.is_of_motion]
     rates, fewest = {group.info.fps for group in groups}, min(len(group.episodes) for group in groups)
     outcomes = comparison.outcomes
     policies = [each.content for each in outcomes.conditions.values()] if outcomes else []

@@ -16,9 +16,8 @@ from handrail.datasets.comparison.report import (
 from handrail.datasets.presentation import wording
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import DASH, number, percent, span
-from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.worst import RANKING, deletion, ranked
+from handrail.datasets.quality.worst import deletion, ranked
 from handrail.datasets.statistics.contrast import Contrast
 
 _TASKS, _WORST = 2, 3  # sentences, and episodes of each metric, that are shown
@@ -119,7 +118,7 @@ def missing_table(comparison: Comparison) -> Table:
     """Return which metrics do not apply or are not comparable, to whom and why."""
     whose: dict[tuple[str, str], list[str]] = {}
     apart = [each for each in comparison.everything.differences if each.incomparable]
-    for metric in METRICS:
+    for metric in comparison.everything.measurements.metrics:
         values = comparison.everything.measurements.values[metric.name].items()
         found = [
             (label if e.estimate is None else f"{label} (some episodes)", e.reason) for label, e in values
@@ -134,7 +133,8 @@ def missing_table(comparison: Comparison) -> Table:
 
 def worst_table(comparison: Comparison, group: Group) -> Table:
     """Return the worst episodes of a group by every metric of which one end is better."""
-    rows = [row for metric in RANKING.values() if (row := _worst(comparison, group, metric))]
+    judging = (metric for metric in comparison.everything.measurements.metrics if metric.good)
+    rows = [row for metric in judging if (row := _worst(comparison, group, metric))]
     return Table(("metric", "episodes (value)", "without them"), rows)
 
 

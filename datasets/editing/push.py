@@ -237,11 +237,12 @@ def _description(root: Path) -> str:
         *(f"{name}: {said}" for name, said in counted.items() if said),
     )
     listed = "\n".join(f"- {line}" for line in lines)
-    metrics = [metric for metric in METRICS if not metric.of_dataset]
-    values = measure({"": episodes}, np.random.default_rng(0), metrics=metrics).values
+    asked = [metric for metric in METRICS if not metric.of_dataset]
+    measured = measure({"": episodes}, np.random.default_rng(0), metrics=asked)
+    values = measured.values
     rows = [
         [metric.title, number(values[metric.name][""].estimate), metric.unit or DASH, metric.meaning]
-        for metric in metrics
+        for metric in measured.metrics
         if values[metric.name][""].known.size
     ]
     table = markdown_table(Table(("metric", "mean", "unit", "meaning"), rows))

@@ -1,7 +1,7 @@
 """Every metric of every episode of the groups that are compared, each value or why there is none."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,8 @@ class Measurements:
     values: Mapping[str, Mapping[str, Value]]
     """By metric and group."""
     groups: Mapping[str, EpisodeSet]
+    metrics: Sequence[Metric]
+    """Those asked for; of datasets with several hands, those of motion for each hand too."""
 
     def why_not(self, metric: Metric, one: str, other: str) -> str:
         """Return why a metric's values of two groups cannot be compared; "" if they can."""
@@ -58,9 +60,10 @@ def measure_views(
         views: Groups of episodes, by title.
         rng: Of intervals and of what is estimated from random batches; drawn from as the views are asked for.
         margin: Distance to keep [m].
-        metrics: Which.
+        metrics: Which; those of motion also of each hand, where there are several.
     """
     sets = [{label: EpisodeSet(each) for label, each in groups.items()} for groups in views.values()]
+    metrics = _by_hand(metrics, sets[0].values())
     for groups in sets:
         _share_scales(list(groups.values()), margin)
     placed = _placed([group for groups in sets for group in groups.values()])
@@ -83,7 +86,14 @@ def measure_views(
             each.name: {label: _value(each, label, title, group, rng) for label, group in groups.items()}
             for each in metrics
         }
-        yield Measurements(values, groups)
+        yield Measurements(values, groups, metrics)
+
+
+def _by_hand(metrics: Sequence[Metric], groups: Iterable[EpisodeSet]) -> list[Metric]:
+    """Return metrics, and behind those of motion the same of each hand that is told apart."""
+    hands = dict.fromkeys(hand for group in groups for hand in group.first.hands)
+    own = ((each, *(map(each.of_hand, hands) if each.is_of_motion else ())) for each in metrics)
+    return [each for found in own for each in found]
 
 
 def _share_scales(groups: Sequence[EpisodeSet], margin: float) -> None:

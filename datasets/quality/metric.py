@@ -1,7 +1,7 @@
 """A quality metric: its name, unit and meaning, what its unit hangs on, and how it is measured."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from handrail.datasets.statistics.contrast import Measure
@@ -24,6 +24,19 @@ class Metric(Measure):
     def help(self) -> str:
         """Its meaning."""
         return self.meaning
+
+    @property
+    def is_of_motion(self) -> bool:
+        """Whether it measures what moves; of several hands, that is each of them."""
+        return self.needs in ("motion", "position")
+
+    def of_hand(self, hand: str) -> "Metric":
+        """Return the metric of one hand alone of several."""
+
+        def measured(episode: Any, scale: Any) -> float:
+            return self.measure(episode.of_hand(hand), scale)
+
+        return replace(self, name=f"{hand}.{self.name}", title=f"{self.title}, {hand}", measure=measured)
 
 
 def metric(

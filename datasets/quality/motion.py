@@ -97,13 +97,14 @@ def straightness(positions: FloatArray, boundaries: IntArray) -> float:
 def phase_boundaries(episode: Demonstration) -> IntArray:
     """Return the frames at which a phase ends and the next begins, `(P,)`.
 
-    Where the recorded phase changes; without one, where the gripper opens or closes; without either or where
-    it never does, at the frame that is farthest from the start, so that there-and-back has two phases.
+    Where the recorded phase changes; without one, where a gripper opens or closes; without either or where
+    none ever does, at the frame that is farthest from the start, so that there-and-back has two phases.
     """
     if episode.has("phase"):
         return _changes(episode.column("phase").reshape(episode.count, -1)[:, 0])
     try:
-        found = _changes(gripper_state(episode.gripper))
+        states = (gripper_state(each) for each in episode.grippers.T)
+        found = np.unique(np.concatenate([_changes(each) for each in states]))
     except DoesNotApply:
         found = np.empty(0, int)
     return found if found.size else farthest(episode.motion)

@@ -1,6 +1,7 @@
 """One line an episode: how it went and how it ended; what a dataset does not hold is None, shown as "–"."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ class EpisodeSummary:
     high_frequency_content: float | None  # of the commanded velocities, see `metrics`
     corrections: int | None  # see `metrics`; of the joints that were commanded one by one, None without any
     robot_client: str | None = None  # LeRobot's client that drove the robot
+    hands: Mapping[str, float | None] = field(default_factory=dict)  # smoothness of each hand of several
 
     def cells(self) -> dict[str, str]:
         """Return the line as text, by heading."""
@@ -48,6 +50,7 @@ class EpisodeSummary:
             "length [s]": f"{self.length:.1f}",
             "smallest distance [m]": _number(self.smallest_distance, ".3f"),
             "smoothness": _number(self.smoothness, ".2f"),
+            **{f"smoothness, {hand}": _number(each, ".2f") for hand, each in self.hands.items()},
             "contacts begun": _number(self.contacts, "d"),
             "rate of change": _number(self.rate_of_change, ".2f"),
             "high-frequency content": _number(self.high_frequency_content, ".2f"),
@@ -76,6 +79,7 @@ def _summary(episode: Demonstration) -> EpisodeSummary:
         high_frequency_content=_known(high_frequency_content(commands, episode.fps)),
         corrections=_corrections(episode),
         robot_client=episode.meta.get(CLIENT) or None,
+        hands={hand: _measured(motion.sparc.of_hand(hand), episode) for hand in episode.hands},
     )
 
 

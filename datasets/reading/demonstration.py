@@ -14,7 +14,8 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import DataFiles
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.naming import (
-    gripper_entry,
+    gripper_entries,
+    hand_names,
     is_velocity,
     point_entries,
     position_entries,
@@ -74,6 +75,8 @@ class Demonstration(Episode):
     """Columns, `(N,)` or `(N, d)`; no pictures."""
     meta: Mapping[str, Any]
     columns: ColumnNames = field(default_factory=ColumnNames)
+    hand: str = ""
+    """Of which hand alone motion and gripper are meant; of all by default."""
 
     def opened(self, files: DataFiles) -> "Demonstration":
         """Return itself: its rows are at hand."""
@@ -85,10 +88,24 @@ class Demonstration(Episode):
         return replace(self, frames=rows, meta={**self.meta, "length": len(frames)})
 
     @cached_property
+    def hands(self) -> tuple[str, ...]:
+        """Names of the hands that state and action tell apart; () of one hand, which has none."""
+        return hand_names((*self.entries("state"), *self.entries("action")))
+
+    def of_hand(self, hand: str) -> "Demonstration":
+        """Return it with motion and gripper of one hand of several."""
+        if hand not in self.hands:
+            raise DoesNotApply(f"no entry of action or state is called {hand}")
+        return replace(self, hand=hand)
+
+    @cached_property
     def motion(self) -> FloatArray:
-        """What moves: the tool's position, `(N, 3)` [m], or else the configuration, in the state's units."""
-        state, names = self.matrix("state"), self.entries("state")
-        return state[:, point_entries(names)] if point_entries(names) else self.configuration
+        """What moves: the tools' positions, `(N, 3 h)` [m], or else the configuration, in the state's units.
+
+        Of h hands one after the other.
+        """
+        state, entries = self.matrix("state"), point_entries(self.entries("state"), self.hand)
+        return state[:, entries] if entries else self.configuration
 
     @property
     def speed(self) -> FloatArray:
@@ -98,13 +115,15 @@ class Demonstration(Episode):
     @property
     def motion_is_tool(self) -> bool:
         """Whether `motion` is the tool's position [m]."""
-        return bool(point_entries(self.entries("state")))
+        return bool(point_entries(self.entries("state"), self.hand))
 
     @cached_property
     def configuration(self) -> FloatArray:
         """Where the robot is: the positions in the state, `(N, c)`, or all of it where no name says."""
-        state, names = self.matrix("state"), self.entries("state")
-        return state[:, position_entries(names)] if position_entries(names) else state
+        state, entries = self.matrix("state"), position_entries(self.entries("state"), self.hand)
+        if self.hand and not entries:
+            raise DoesNotApply(f"no position in the state is of {self.hand}")
+        return state[:, entries] if entries else state
 
     @cached_property
     def observation(self) -> FloatArray:
@@ -143,12 +162,11 @@ class Demonstration(Episode):
         return action
 
     @cached_property
-    def gripper(self) -> FloatArray:
-        """What opens and closes the gripper, commanded or else measured, `(N,)`."""
+    def grippers(self) -> FloatArray:
+        """What opens and closes the gripper of each hand, commanded or else measured, `(N, h)`."""
         for part in ("action", "state"):
-            place = gripper_entry(self.entries(part))
-            if place is not None:
-                return self.matrix(part)[:, place]
+            if places := gripper_entries(self.entries(part), self.hand):
+                return self.matrix(part)[:, places]
         raise DoesNotApply("no entry of action or state is called gripper")
 
     @property

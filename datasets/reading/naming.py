@@ -1,36 +1,65 @@
-"""What the names of a column's entries say: which are a point in space, which mean the same."""
+"""What the names of a column's entries say: which are a point in space, which mean the same.
 
+With several hands the names of what is a hand's begin with its own: `left.tool.x`, `left_gripper.pos`.
+"""
+
+import re
 from collections.abc import Sequence
 
 Pair = tuple[int, int]  # the entry of the action and the entry of the state that it commands
 
 _POINTS = ("tool", "ee", "eef", "end_effector", "gripper_pose", "hand")
+_POINT = re.compile(rf"(.*[._])?({'|'.join(_POINTS)})\.")
+_HAND = re.compile(rf"(\w+)[._](?:(?:{'|'.join(_POINTS)})[._]x|gripper(?:\.\w+)?)")
 
 
-def point_entries(names: Sequence[str]) -> list[int]:
-    """Return the entries that are the tool's position, in order x, y, z; none where no name says so."""
+def hand_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the hands that a column's entries tell apart; () of one hand, which has none."""
+    found = (_HAND.fullmatch(name.lower().removesuffix(".pos")) for name in names)
+    hands = dict.fromkeys(each[1] for each in found if each)
+    return tuple(hands) if len(hands) > 1 else ()
+
+
+def point_entries(names: Sequence[str], hand: str = "") -> list[int]:
+    """Return the entries that are the tool's position, in order x, y, z; none where no name says so.
+
+    Of several hands one after the other; `hand` is the one that is meant.
+    """
+    if hands := () if hand else hand_names(names):
+        return [entry for each in hands for entry in point_entries(names, each)]
     lower = [name.lower() for name in names]
     plain = [name.removesuffix(".pos") for name in lower]
-    for point in _POINTS:
+    for point in (prefix + point for point in _POINTS for prefix in _prefixes(hand)):
         for joint in (".", "_"):
             wanted = [f"{point}{joint}{axis}" for axis in "xyz"]
             if all(name in plain for name in wanted):
                 return [plain.index(name) for name in wanted]
+    if hand:
+        return []
     for wanted in (list("xyz"), list("xy")):
         if all(name in lower for name in wanted):
             return [lower.index(name) for name in wanted]
     return []
 
 
-def position_entries(names: Sequence[str]) -> list[int]:
-    """Return the entries that are joint positions (`elbow.pos`), the gripper's included."""
-    return [index for index, name in enumerate(names) if name.endswith(".pos")]
+def position_entries(names: Sequence[str], hand: str = "") -> list[int]:
+    """Return the entries that are joint positions (`elbow.pos`), the gripper's included; of a hand's arm."""
+    own = _prefixes(hand)
+    return [i for i, name in enumerate(names) if name.endswith(".pos") and name.lower().startswith(own)]
 
 
-def gripper_entry(names: Sequence[str]) -> int | None:
-    """Return the entry that opens and closes the gripper."""
-    found = [index for index, name in enumerate(names) if "gripper" in name.lower()]
-    return found[0] if len(found) == 1 else None
+def gripper_entries(names: Sequence[str], hand: str = "") -> list[int]:
+    """Return the entries that open and close a gripper, one a hand; none where names do not tell which."""
+    if hands := () if hand else hand_names(names):
+        return [entry for each in hands for entry in gripper_entries(names, each)]
+    lower, own = [name.lower() for name in names], _prefixes(hand)
+    found = [i for i, name in enumerate(lower) if "gripper" in name and name.startswith(own)]
+    return found if len(found) == 1 else []
+
+
+def _prefixes(hand: str) -> tuple[str, ...]:
+    """Return how names of what is a hand's begin."""
+    return (f"{hand}.", f"{hand}_") if hand else ("",)
 
 
 def is_velocity(name: str) -> bool:
@@ -45,7 +74,7 @@ def quantity(name: str) -> str:
         return "gripper"
     if is_velocity(lower):
         return "velocity"
-    point = lower in ("x", "y", "z") or lower.startswith(tuple(f"{each}." for each in _POINTS))
+    point = lower in ("x", "y", "z") or _POINT.match(lower)
     return "position" if point or lower.endswith((".pos", "_pos", ".position")) else ""
 
 

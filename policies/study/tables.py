@@ -116,13 +116,13 @@ def quality_table(task: str, results: Results) -> Table:
     """Return the quality metrics of the demonstrations: the mean over draws of the mean over episodes."""
     modes = [mode for mode in results.progress.design.modes if results.collected(task, mode)]
     found = [[each["quality"] for each in results.collected(task, mode)] for mode in modes]
-    rows = []
-    for metric in METRICS:
-        values = [[each.get(metric.name) for each in draws] for draws in found]
+    rows, titles = [], {metric.name: metric.title for metric in METRICS}
+    for name in dict.fromkeys(name for draws in found for each in draws for name in each):
+        values = [[each.get(name) for each in draws] for draws in found]
         means = [[value for value in each if value is not None] for each in values]
         if any(means):
             shown = (number(float(np.mean(each))) if each else DASH for each in means)
-            rows.append((metric.title, *shown))
+            rows.append((titles.get(name, name), *shown))
     return Table(("metric", *modes), rows, "The demonstrations: described, not tested")
 
 
