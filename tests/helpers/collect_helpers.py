@@ -80,7 +80,8 @@ def recording(root: Path, env: HandrailEnv) -> Iterator[Recorder]:
 
 
 def action(env: HandrailEnv, velocity: Any = 0.0, gripper: float = 0.0) -> np.ndarray:
-    return np.append(np.zeros(env.model.size) + velocity, gripper).astype(np.float32)
+    grippers = [gripper] * len(env.model.description.hands)
+    return np.append(np.zeros(env.model.size) + velocity, grippers).astype(np.float32)
 
 
 def hold(env: HandrailEnv, steps: int, gripper: float = 0.0, velocity: Any = 0.0) -> dict:
