@@ -34,8 +34,8 @@ class LeKiwiBody:
 
     def __init__(self, env: HandrailEnv, units: RobotUnits) -> None:
         assert units.base is not None
-        assert units.gripper is not None
-        self._env, self._units, self._base, self._grip = env, units, units.base, units.gripper
+        assert units.grippers[0] is not None
+        self._env, self._units, self._base, self._grip = env, units, units.base, units.grippers[0]
         self._painters: dict[str, Painter] = {}
 
     def reset(self, seed: int) -> None:
@@ -53,7 +53,7 @@ class LeKiwiBody:
             Whether it made sense; one that does not changes nothing.
         """
         twist = np.array([number(action, name) for name in self._base.twist])
-        now = self._units.action(self._arm, np.zeros(len(self._arm)), self._twist, self._gripper)
+        now = self._units.action(self._arm, np.zeros(len(self._arm)), self._twist, (self._gripper,))
         names = (*self._units.positions, self._grip.name)
         said = {name: number(action, name) for name in names if name in action}
         if not np.isfinite(twist).all() or not all(map(math.isfinite, said.values())):
@@ -93,7 +93,7 @@ class LeKiwiBody:
         """Return what LeKiwi says: joint positions, and the speeds of its wheels as the base's."""
         state, world = self._env.state(), self._env.plant
         twist = turned(state.v[:3], -state.q[2])
-        return self._units.action(state.q[3:], state.v[3:], twist, 1.0 - world.openings[0])
+        return self._units.action(state.q[3:], state.v[3:], twist, (1.0 - world.openings[0],))
 
     def picture(self, camera: str) -> np.ndarray:
         """Return what a camera of LeKiwi's sees, (height, width, 3)."""

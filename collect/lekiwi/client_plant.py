@@ -126,7 +126,7 @@ class ClientPlant(Plant):
     @property
     def openings(self) -> tuple[float, ...]:
         """How far the gripper is open, from 0 to 1."""
-        return (self._link.body.opening,)
+        return tuple(self._link.body.openings.tolist())
 
     @property
     def contacts(self) -> tuple[str, ...]:

@@ -36,6 +36,7 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
+from handrail.controllers.objectives.together import together
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
@@ -86,7 +87,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
     robot: str = "ridgeback_ur10"
     """Its name, or its description (.toml)."""
     units: str | dict[str, Any] = "plain"
-    """Its names and units: lekiwi, so_follower, plain, or a table (docs/processor.md)."""
+    """Its names and units: plain, those of a robot of LeRobot's, or a table (docs/processor.md)."""
     fps: Positive = 30.0
     """How often the step is asked [Hz]."""
     inputs: Annotated[dict[str, tuple[str, Number]], Meta()] = field(default_factory=dict)
@@ -96,7 +97,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
     base_frame: Literal["base", "world"] = "base"
     """The same of the base's."""
     gripper: Literal["share", "actions"] = "share"
-    """What its entry is: share (0 open, 1 closed) or actions (LeRobot's 0 close, 1 stay, 2 open)."""
+    """What its entries are: share (0 open, 1 closed) or actions (LeRobot's 0 close, 1 stay, 2 open)."""
     obstacles: list[dict[str, Any]] = field(default_factory=list)
     """What stands around, as tables of name, kind, size, position, rpy and work_surface."""
     start: Annotated[list[Number], Meta(min_length=3, max_length=3)] = field(
@@ -118,8 +119,6 @@ class MaskedMpcStep(RobotActionProcessorStep):
         """Build the controller."""
         check_settings(self, NAME)
         model = load_model(self.robot)
-        if len(model.description.hands) > 1:
-            raise HandrailError(f"{NAME}: expected a robot with one hand, got {self.robot}")
         channels, units = Channels.of(model.description), robot_units(self.units, model.description)
         self._around, self._action_names = parsed_obstacles(self.obstacles), units.action_names
         frames = Frames(self.base_frame, self.tool_frame)
@@ -129,7 +128,8 @@ class MaskedMpcStep(RobotActionProcessorStep):
         settings = decoded(usual | self.settings, MpcSettings, f"{NAME} settings")
         settings.check_period(1.0 / self.fps, f"fps of {NAME}")
         centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
-        self._mpc = MaskedMpc(model, settings, centring)
+        pair = (together(channels),) if channels.pair else ()
+        self._mpc = MaskedMpc(model, settings, (*centring, *pair))
         self.reset()
 
     def reset(self) -> None:
@@ -144,7 +144,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         now = float(self.clock())
         self._note_lateness(now)
         state = self._body.observe(self.transition.get(TransitionKey.OBSERVATION), now)
-        intent = self._intent.read(action, self._body.targets, self._body.opening, now)
+        intent = self._intent.read(action, self._body.targets, self._body.openings, now)
         if self._body.trouble:
             intent = replace(intent, time=LONG_AGO)
         command = self._mpc.update(state, intent)

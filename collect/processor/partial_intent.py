@@ -25,7 +25,8 @@ class PartialIntent:
     - a channel (`ee.vx`, `base.wz`, `joint.elbow_flex`), in m/s and rad/s;
     - a name of `inputs`: so many times a channel;
     - an entry of the robot's own action: a leader's joint, which is followed, or the base's velocity;
-    - `gripper`, 0 open to 1 closed, or LeRobot's action: 0 closes, 1 leaves it, 2 opens;
+    - `gripper`, of several hands `left.gripper`: 0 open to 1 closed, or LeRobot's action: 0 closes, 1 leaves
+      it, 2 opens;
     - `time`, when it was asked, on the clock of the step [s].
 
     Args:
@@ -53,32 +54,36 @@ class PartialIntent:
         if units.base:
             self._scaled |= zip(units.base.twist, enumerate(units.base.scale), strict=True)
         self._first_arm = channels.joint_slice.start + len(channels.base)
+        own = enumerate(units.grippers)
+        self._of_robot = {gripper.name: (hand, gripper) for hand, gripper in own if gripper}
         self.reset()
 
     def reset(self) -> None:
-        """Forget how far the gripper was asked to close."""
-        self._grip: float | None = None
+        """Forget how far the grippers were asked to close."""
+        self._grips: list[float | None] = [None] * len(self._channels.hands)
 
-    def read(self, action: Any, targets: FloatArray, opening: float, now: float) -> Intent:
+    def read(self, action: Any, targets: FloatArray, openings: FloatArray, now: float) -> Intent:
         """Return the intent of an action; one that is malformed says so by numbers that are none.
 
         Args:
             action: of a teleoperator.
             targets: where the arm's joints are sent now, (n − b,).
-            opening: of the gripper.
+            openings: of the grippers, (h,).
             now: the time of an action that says none [s].
         """
         values, mask = np.zeros(self._channels.size), np.zeros(self._channels.size, dtype=bool)
         entries = action if isinstance(action, Mapping) else {"": math.nan}
         units, stamp = self._units, now
-        grip = self._grip if self._grip is not None else float(opening < 0.5)
+        pairs = zip(self._grips, openings, strict=True)
+        grips = [float(opening < 0.5) if grip is None else grip for grip, opening in pairs]
         for name in entries:
             value = number(entries, name)
             if name == "time":
                 stamp = value
-            elif name == "gripper":
+            elif name in self._channels.grippers:
+                hand = self._channels.grippers.index(name)
                 grip = _ACTIONS.get(value, math.nan) if self._actions else value
-                grip = (self._grip or 0.0) if grip == _STAYS else grip
+                grips[hand] = (self._grips[hand] or 0.0) if grip == _STAYS else grip
             elif name in self._scaled:
                 index, scale = self._scaled[name]
                 values[index] += scale * value
@@ -88,9 +93,11 @@ class PartialIntent:
                 wanted = units.joint_positions(np.where(np.arange(len(targets)) == joint, value, 0.0))
                 values[self._first_arm + joint] += _FOLLOW * (wanted[joint] - targets[joint])
                 mask[self._first_arm + joint] = True
-            elif units.gripper and name == units.gripper.name:
-                grip = units.gripper.closing(value)
+            elif name in self._of_robot:
+                hand, gripper = self._of_robot[name]
+                grips[hand] = gripper.closing(value)
             else:
                 values[:], mask[:] = math.nan, True
-        self._grip = grip if math.isfinite(grip) else self._grip
-        return Intent(values, mask, (grip,), "processor", stamp, self._frames)
+        kept = zip(grips, self._grips, strict=True)
+        self._grips = [grip if math.isfinite(grip) else before for grip, before in kept]
+        return Intent(values, mask, tuple(grips), "processor", stamp, self._frames)

@@ -1,19 +1,21 @@
 """What a robot of LeRobot's calls its joints, and in which units: from its numbers to ours, and back."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import RobotDescription
 from handrail.controllers.typed import Number, Text, decoded
 
 POSITION, VELOCITY = ".pos", ".vel"
 _OPEN = 35.0  # percent of the jaw's range, −0.17 to 1.75 rad: where the model of the SO-101 is open, 0.5 rad
+_OPENARM_OPEN, _REACHY_OPEN = -65.0, 130.0  # degrees; closed at 0
 _SENT = {"position": POSITION, "velocity": VELOCITY}
 _RADIANS = {"degrees": math.pi / 180.0}  # of an angle's unit; 1 of any other
 
@@ -97,15 +99,18 @@ class UnitsTable:
     joints: Mapping[str, JointUnits]
     base: BaseUnits | None = None
     gripper: GripperUnits | None = None
+    """Of a single hand."""
+    grippers: Mapping[str, GripperUnits] = field(default_factory=dict)
+    """Of several hands, by their names."""
 
 
 class BodyReading(NamedTuple):
-    """What an observation says [m, rad]: joints, (n − b,); the base's twist and pose, (3,); opening."""
+    """What an observation says [m, rad]: joints, (n − b,); base's twist and pose, (3,); openings, (h,)."""
 
     arm: FloatArray
     twist: FloatArray
     pose: FloatArray | None
-    opening: float
+    openings: FloatArray
 
 
 class RobotUnits:
@@ -117,7 +122,7 @@ class RobotUnits:
 
     Attributes:
         base: None on a fixed base.
-        gripper: None where there is none.
+        grippers: of each hand; None where it has none.
         positions: names of the arm's positions.
         action_names: of the action's entries, in order.
         observation_names: of the numbers that an observation has to have.
@@ -126,7 +131,12 @@ class RobotUnits:
 
     def __init__(self, description: RobotDescription, table: UnitsTable) -> None:
         arm, b, limits = description.arm_joints, len(description.base.joints), description.limits
-        self.base, self.gripper = table.base, table.gripper
+        hands = [hand.name for hand in description.hands]
+        given = table.grippers if len(hands) > 1 else {hands[0]: table.gripper}
+        if set(table.grippers) - set(hands) or (len(hands) > 1 and table.gripper):
+            words = "grippers of " + ", ".join(hands) if len(hands) > 1 else "gripper alone"
+            raise HandrailError(f"units of robot {description.name}: expected {words}, got others")
+        self.base, self.grippers = table.base, tuple(given.get(hand) for hand in hands)
         if set(table.joints) != set(arm) or bool(self.base) != bool(b):
             raise HandrailError(
                 f"units of robot {description.name}: expected joints {', '.join(arm)} and "
@@ -141,7 +151,7 @@ class RobotUnits:
         self.sends_position = np.array([joint.sends == "position" for joint in joints], dtype=bool)
         self.positions = tuple(joint.name + POSITION for joint in joints)
         sent = (joint.name + _SENT[joint.sends] for joint in joints)
-        grip = (self.gripper.name,) if self.gripper else ()
+        grip = tuple(each.name for each in self.grippers if each)
         twist = self.base.twist if self.base else ()
         self.action_names = (*sent, *grip, *twist)
         self.observation_names = (*self.positions, *grip, *(self.base.pose or twist if self.base else ()))
@@ -157,22 +167,24 @@ class RobotUnits:
             pose = self.base.scale * [values[name] for name in self.base.pose]
         elif self.base:
             twist = self.base.scale * [values[name] for name in self.base.twist]
-        opening = 1.0 - self.gripper.closing(values[self.gripper.name]) if self.gripper else 0.0
-        return BodyReading(arm, twist, pose, opening)
+        openings = [1.0 - each.closing(values[each.name]) if each else 0.0 for each in self.grippers]
+        return BodyReading(arm, twist, pose, np.array(openings))
 
-    def action(self, q: FloatArray, v: FloatArray, twist: FloatArray, gripper: float) -> dict[str, float]:
+    def action(
+        self, q: FloatArray, v: FloatArray, twist: FloatArray, grippers: Sequence[float] | FloatArray
+    ) -> dict[str, float]:
         """Return the robot's action.
 
         Args:
             q: where the arm's joints shall be, (n − b,).
             v: how fast they shall move, (n − b,).
             twist: of the base in its own frame [m/s, rad/s], (3,).
-            gripper: 0 open, 1 closed.
+            grippers: of each hand, 0 open, 1 closed, (h,).
         """
         values = np.where(self.sends_position, (q - self._centre) / self._scale + self._zero, v / self._scale)
         numbers = values.tolist()
-        if self.gripper:
-            numbers.append(self.gripper.opened + gripper * (self.gripper.closed - self.gripper.opened))
+        for each, closed in zip(self.grippers, grippers, strict=True):
+            numbers += [each.opened + closed * (each.closed - each.opened)] if each else []
         if self.base:
             numbers += (twist / self.base.scale).tolist()
         return dict(zip(self.action_names, map(float, numbers), strict=True))
@@ -191,25 +203,64 @@ def number(values: Any, name: str) -> float:
 
 
 def robot_units(said: str | Mapping[str, Any], description: RobotDescription) -> RobotUnits:
-    """Return names and units of a robot: of a table, or as LeRobot's LeKiwi, SO-100 and SO-101 have them.
+    """Return names and units of a robot: of a table, or as one of LeRobot's robots has them.
 
     `plain` are the description's own names in radians, the gripper from 0 (open) to 1, the base in radians.
     """
     if not isinstance(said, str):
         return RobotUnits(description, decoded(said, UnitsTable, "units"))
-    arm, plain_base = description.arm_joints, BaseUnits(unit="radians") if description.base.joints else None
-    plain_gripper = GripperUnits("gripper.pos", 0.0, 1.0) if description.hands[0].gripper else None
-    known = {
-        "lekiwi": UnitsTable(
-            {name: JointUnits(f"arm_{name}") for name in arm},
-            BaseUnits(),
-            GripperUnits("arm_gripper.pos", _OPEN, 0.0),
-        ),
-        "so_follower": UnitsTable(
-            {name: JointUnits(name) for name in arm}, None, GripperUnits("gripper.pos", _OPEN, 0.0)
-        ),
-        "plain": UnitsTable({name: JointUnits(name, "radians") for name in arm}, plain_base, plain_gripper),
-    }
-    if said not in known:
-        raise unknown_name("units", said, known)
-    return RobotUnits(description, known[said])
+    if said not in _KNOWN:
+        raise unknown_name("units", said, _KNOWN)
+    return RobotUnits(description, _KNOWN[said](description))
+
+
+def _plain(description: RobotDescription) -> UnitsTable:
+    base = BaseUnits(unit="radians") if description.base.joints else None
+    hands = [hand for hand in description.hands if hand.gripper]
+    own = {hand.name: GripperUnits(hand.named("gripper.pos"), 0.0, 1.0) for hand in hands}
+    joints = {name: JointUnits(name, "radians") for name in description.arm_joints}
+    return UnitsTable(joints, base, own.pop("", None), own)
+
+
+def _in_degrees(prefix: str, base: BaseUnits | None = None) -> Callable[[RobotDescription], UnitsTable]:
+    """Return the units of one SO-100 or SO-101."""
+
+    def table(description: RobotDescription) -> UnitsTable:
+        joints = {name: JointUnits(prefix + name) for name in description.arm_joints}
+        return UnitsTable(joints, base, GripperUnits(f"{prefix}gripper.pos", _OPEN, 0.0))
+
+    return table
+
+
+def _bi_so_follower(description: RobotDescription) -> UnitsTable:
+    joints = {name: JointUnits(name) for name in description.arm_joints}
+    grippers = (hand.name for hand in description.hands)
+    return UnitsTable(joints, None, None, {n: GripperUnits(f"{n}_gripper.pos", _OPEN, 0.0) for n in grippers})
+
+
+def _bi_openarm_follower(description: RobotDescription) -> UnitsTable:
+    """Return units in which the joints of each arm are numbered from 1."""
+    channels, joints, grippers = Channels.of(description), {}, {}
+    for hand in (hand.name for hand in description.hands if hand.name):
+        arm = np.array(description.joints)[channels.mask(f"{hand}.arm")[channels.joint_slice]]
+        joints |= {str(name): JointUnits(f"{hand}_joint_{i}") for i, name in enumerate(arm, start=1)}
+        grippers[hand] = GripperUnits(f"{hand}_gripper.pos", _OPENARM_OPEN, 0.0)
+    return UnitsTable(joints, None, None, grippers)
+
+
+def _reachy2(description: RobotDescription) -> UnitsTable:
+    joints = {name: JointUnits(name) for name in description.arm_joints}
+    base = BaseUnits("mobile_base.vx", "mobile_base.vy", "mobile_base.vtheta")
+    hands = {hand.name: f"{hand.name[:1]}_gripper.pos" for hand in description.hands}
+    grippers = {hand: GripperUnits(name, _REACHY_OPEN, 0.0) for hand, name in hands.items()}
+    return UnitsTable(joints, base if description.base.joints else None, None, grippers)
+
+
+_KNOWN: Mapping[str, Callable[[RobotDescription], UnitsTable]] = {
+    "bi_openarm_follower": _bi_openarm_follower,
+    "bi_so_follower": _bi_so_follower,
+    "lekiwi": _in_degrees("arm_", BaseUnits()),
+    "plain": _plain,
+    "reachy2": _reachy2,
+    "so_follower": _in_degrees(""),
+}

@@ -52,7 +52,7 @@ class WholeBody:
     Attributes:
         trouble: what is wrong with the observation now; empty if nothing is.
         targets: where the arm's joints are sent, (n − b,) [rad, m].
-        sent: the command sent last, inside the limits, (n + 1,).
+        sent: the command sent last, inside the limits, (n + h,).
     """
 
     def __init__(
@@ -60,8 +60,9 @@ class WholeBody:
     ) -> None:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
         self._b = len(model.description.base.joints)
-        gripper = model.description.hands[0].gripper
-        self._grip_step = period * (gripper.speed / gripper.stroke if gripper else _STROKES)
+        grippers = [hand.gripper for hand in model.description.hands]
+        strokes = [each.speed / each.stroke if each else _STROKES for each in grippers]
+        self._grip_steps = period * np.array(strokes)
         self.reset()
 
     def reset(self, base: ArrayLike = (0.0, 0.0, 0.0)) -> None:
@@ -76,9 +77,9 @@ class WholeBody:
         self._said: object = None
         self._heard, self._time, self._sent_at = -math.inf, -math.inf, -math.inf
         self._held = np.zeros(self._model.size, dtype=bool)
-        self._twist, self.trouble, self._grip = np.zeros(3), "", 0.0
+        self._twist, self.trouble, self._grips = np.zeros(3), "", np.zeros(len(self._grip_steps))
         self._under_way, self._rested = np.zeros(3), 0.0
-        self.sent = np.zeros(self._model.size + 1)
+        self.sent = np.zeros(self._model.size + len(self._grips))
         self.targets = np.zeros(self._model.size - self._b)
 
     def place(self, base: ArrayLike) -> None:
@@ -91,9 +92,9 @@ class WholeBody:
         return self._gate.velocity
 
     @property
-    def opening(self) -> float:
-        """How far the gripper is open, from 0 to 1."""
-        return self._reading.opening if self._reading else 0.0
+    def openings(self) -> FloatArray:
+        """How far each hand's gripper is open, from 0 to 1, (h,)."""
+        return self._reading.openings if self._reading else np.zeros(len(self._grips))
 
     def observe(self, observation: Any, now: float) -> State:
         """Take what the robot says, and return its state.
@@ -126,7 +127,7 @@ class WholeBody:
         """Return the robot's action for a command, inside the limits.
 
         Args:
-            command: velocities at the end of a period, the base's in the world, and gripper, (n + 1,).
+            command: velocities at the end of a period, the base's in the world, and grippers, (n + h,).
         """
         assert self._reading is not None
         b, base = self._b, self._expected()
@@ -142,8 +143,8 @@ class WholeBody:
         self.targets = np.clip(self.targets + max(share, 0.0) * way, arm - _LEAD, arm + _LEAD)
         self._held[b:] = share < 1.0
         self._twist = turned(self._gate.velocity[:3], -base[2]) if b else np.zeros(3)
-        self._grip += float(np.clip(self._gate.grippers[0] - self._grip, -self._grip_step, self._grip_step))
-        return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grip)
+        self._grips += np.clip(self._gate.grippers - self._grips, -self._grip_steps, self._grip_steps)
+        return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grips)
 
     def _go_on(self, now: float) -> None:
         """Take note of how far the base was sent, which it says later: `sent - said`, 0 after a rest."""
@@ -159,7 +160,7 @@ class WholeBody:
         before, base = self._reading, self._base
         if before is None:
             self.targets = reading.arm.copy()
-            self._grip = 1.0 - reading.opening
+            self._grips = 1.0 - reading.openings
         elif reading.pose is None:
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), self._since(now))
         if reading.pose is not None:

@@ -78,6 +78,12 @@ class Channels:
         return slice(len(self.base), self.size - len(self.joints))
 
     @property
+    def grippers(self) -> tuple[str, ...]:
+        """Names of the hands' grippers, as commands and recordings have them."""
+        hands = [_kind(names[0]) for names in self.hands]
+        return ("gripper",) if len(hands) == 1 else tuple(f"{hand}.gripper" for hand in hands)
+
+    @property
     def pair_slice(self) -> slice:
         """Where the twist of the pair lies, and how fast it parts; empty of one hand."""
         end = self.size - len(self.joints)

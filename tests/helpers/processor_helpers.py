@@ -21,15 +21,19 @@ class PlainRobot:
     arm: np.ndarray
     pose: np.ndarray = field(default_factory=lambda: np.zeros(3))
     twist: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    grips: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.grips = np.zeros(len(self.units.grippers))
 
     def observation(self) -> dict:
-        return self.units.action(self.arm, np.zeros(len(self.arm)), self.twist, 0.0)
+        return self.units.action(self.arm, np.zeros(len(self.arm)), self.twist, self.grips)
 
     def send(self, action: dict) -> None:
         reading = self.units.read(action)
         assert reading is not None, action
         self.pose = moved(self.pose, 0.5 * (self.twist + reading.twist), PERIOD)
-        self.arm, self.twist = reading.arm, reading.twist
+        self.arm, self.twist, self.grips = reading.arm, reading.twist, 1.0 - reading.openings
 
 
 class Drive:

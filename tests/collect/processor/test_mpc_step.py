@@ -188,7 +188,7 @@ def test_it_says_the_robot_s_own_action():
     ("setting", "words"),
     [
         ({"robot": "nobody"}, "unknown robot"),
-        ({"units": "yards"}, "unknown units 'yards': expected one of lekiwi, plain, so_follower"),
+        ({"units": "yards"}, "unknown units 'yards': expected one of bi_openarm_follower, bi_so"),
         ({"units": {"joints": {}}}, "expected joints shoulder_pan_joint"),
         ({"units": {"joints": {"a": {"name": "a", "unit": "yards"}}}}, "unit: expected one of degrees"),
         ({"inputs": {"a": ["ee.up", 1.0]}}, "'ee.up': expected one of"),
