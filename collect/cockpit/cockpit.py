@@ -199,7 +199,7 @@ class Cockpit:
             "episodes": self._episodes.described(),
             "folder": self._folder,
             "wanted": self._wanted,
-            "hand": stage.hand(compiled),
+            "hands": [{"name": hand.name, "bodies": stage.hand(compiled, hand)} for hand in robot.hands],
             "scale": robot.world.scale,
             "base_size": robot.base.size if len(channels.base) else (),
         }

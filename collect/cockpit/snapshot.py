@@ -1,6 +1,6 @@
 """What the page shows of a moment: one small value, many times a second."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -56,16 +56,42 @@ def reason(status: Status, contacts: Iterable[str], q: FloatArray, robot: RobotD
     return " · ".join(filter(None, [STATUS[status], *found]))
 
 
-def hand_ahead(model: RobotModel, intent: Intent, tool: Pose, q: FloatArray) -> Pose | None:
-    """Return the hand's pose within `AHEAD`, at the velocity that is asked for; None where none is."""
+def hands_ahead(
+    model: RobotModel, intent: Intent, tools: Sequence[Pose], q: FloatArray
+) -> tuple[Pose | None, ...]:
+    """Return each hand's pose within `AHEAD`, at the velocity that is asked for; None where none is."""
     channels, asked = Channels.of(model.description), _asked(intent)
-    twist, joints = asked[channels.hand_slice()], asked[channels.joint_slice]
-    if twist.any():
-        in_tool = intent.frames.tool == "tool"
-        linear, angular = (tool.rotation @ part if in_tool else part for part in (twist[:3], twist[3:]))
-        turn = Rotation.from_rotvec(AHEAD * angular).as_matrix()
-        return Pose(tool.position + AHEAD * linear, turn @ tool.rotation)
-    return model.pose(q + AHEAD * joints) if joints[len(channels.base) :].any() else None
+    pair, joints = asked[channels.pair_slice], asked[channels.joint_slice]
+    if pair.any():
+        return _pair_ahead(pair, tools, intent.frames.tool == "tool")
+    moved, found = joints[len(channels.base) :].any(), list[Pose | None]()
+    for number, (hand, tool) in enumerate(zip(model.description.hands, tools, strict=True)):
+        twist = asked[channels.hand_slice(number)]
+        if twist.any():
+            axes = tool.rotation if intent.frames.tool == "tool" else np.eye(3)
+            found.append(_moved(tool, axes @ twist[:3], axes @ twist[3:], tool.position))
+        else:
+            found.append(model.pose(q + AHEAD * joints, hand.named("tool")) if moved else None)
+    return tuple(found)
+
+
+def _pair_ahead(pair: FloatArray, tools: Sequence[Pose], in_tool: bool) -> tuple[Pose, ...]:
+    """Return the poses of two hands that move as one body about the middle between them, and part."""
+    axes = tools[0].rotation if in_tool else np.eye(3)
+    way = tools[1].position - tools[0].position
+    parting = 0.5 * pair[6] * way / max(float(np.linalg.norm(way)), 1e-9)
+    middle, linear, angular = tools[0].position + 0.5 * way, axes @ pair[:3], axes @ pair[3:6]
+    one, other = tools
+    return (
+        _moved(one, linear - parting, angular, middle),
+        _moved(other, linear + parting, angular, middle),
+    )
+
+
+def _moved(tool: Pose, linear: FloatArray, angular: FloatArray, about: FloatArray) -> Pose:
+    """Return a pose within `AHEAD` that goes along, and turns about a point."""
+    turn = Rotation.from_rotvec(AHEAD * angular).as_matrix()
+    return Pose(about + turn @ (tool.position - about) + AHEAD * linear, turn @ tool.rotation)
 
 
 def base_ahead(model: RobotModel, intent: Intent, q: FloatArray) -> FloatArray | None:
@@ -117,8 +143,9 @@ class Snapshots:
             "left": round(env.task.horizon - state.time, 1),
             "phase": person.phase.value,
             "poses": stage.poses(env.simulation.data),
-            "tool": _numbers(view.tool),
-            "opening": round(view.task.opening, 2),
+            "hand": person.meaning.hands.index(setting.hand),
+            "tools": [_numbers(tool) for tool in view.task.tools],
+            "openings": np.round(view.task.openings, 2).tolist(),
             "mode": setting.mode.name,
             "focus": setting.focus if setting.mode.by_focus else "",
             "frame": setting.frame,
@@ -140,30 +167,34 @@ class Snapshots:
             return None
         turn = [] if aim.rotation is None else quaternion_from_matrix(aim.rotation)
         pose = np.round(np.concatenate([aim.position, turn]), 4).tolist()
-        return {"name": aim.name, "pose": pose, "distance": aim.distance, "angle": round(aim.angle, 4)}
+        said = {"name": aim.name, "pose": pose, "distance": aim.distance, "angle": round(aim.angle, 4)}
+        return said | {"hand": state.hand}
 
     def _controlled(self, view: View) -> dict[str, Any]:
         """Return how the controller fares, and where intent and plan lead.
 
-        The ghosts are the hand's pose, (7,), and the base's x, y, yaw, empty at rest; the plan is the path of
-        the hand, (k, 3), and the track of the base's x, y, yaw, (k, 3) [m, rad].
+        The ghosts are each hand's pose, (7,), and the base's x, y, yaw, empty at rest; the plan is the path
+        of each hand, (k, 3), and the track of the base's x, y, yaw, (k, 3) [m, rad].
         """
         frame, model, q = self._frame, self._model, view.state.q
         shown: dict[str, Any] = {"undos": 0, "status": "ok", "reason": ""}
-        shown |= {"ghost": [], "ghost_base": [], "path": [], "track": []}
+        shown |= {"ghosts": [], "ghost_base": [], "paths": [], "track": []}
         if frame is None:
             return shown
         status = frame.diagnostics.status
         shown["undos"], shown["status"] = frame.undos, status.value
         shown["reason"] = reason(status, self._env.plant.contacts, q, model.description)
-        if hand := hand_ahead(model, frame.intent, view.tool, q):
-            shown["ghost"] = _numbers(hand)
+        hands = hands_ahead(model, frame.intent, view.task.tools, q)
+        shown["ghosts"] = [_numbers(hand) if hand else [] for hand in hands]
         if (base := base_ahead(model, frame.intent, q)) is not None:
             shown["ghost_base"] = np.round(base, 3).tolist()
         if frame.plan is not None:
             path, _ = frame.plan.path(q)
             chosen = path[:: max(1, len(path) // _PATH_STEPS)]
-            shown["path"] = [np.round(model.pose(each).position, 3).tolist() for each in chosen]
+            shown["paths"] = [
+                [np.round(model.pose(each, hand.named("tool")).position, 3).tolist() for each in chosen]
+                for hand in model.description.hands
+            ]
             joints = len(model.description.base.joints)
             shown["track"] = np.round(chosen[:, :joints], 3).tolist() if joints else []
         return shown

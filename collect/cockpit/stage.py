@@ -8,6 +8,7 @@ import numpy as np
 from handrail.collect.world.geometry import VISIBLE_GROUP
 from handrail.collect.world.gl import MjData, MjModel, mujoco
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.robot.parts import EndEffector
 
 _KINDS = {
     mujoco.mjtGeom.mjGEOM_BOX: "box",
@@ -40,12 +41,12 @@ def shapes(model: MjModel) -> dict[str, Any]:
     return {"bodies": names, "geoms": geoms, "meshes": table}
 
 
-def hand(model: MjModel) -> list[int]:
-    """Return the bodies that are the hand: the gripper, or the link behind it, and what hangs on that."""
+def hand(model: MjModel, which: EndEffector) -> list[int]:
+    """Return the bodies that are a hand: the gripper, or the link behind it, and what hangs on that."""
     names = {model.body(index).name: index for index in range(model.nbody)}
-    tool = int(model.site_bodyid[model.site("tool").id])
+    tool = int(model.site_bodyid[model.site(which.named("tool")).id])
     drawn = set(model.geom_bodyid[model.geom_group == VISIBLE_GROUP].tolist())
-    first = names.get("gripper", tool)
+    first = names.get(which.named("gripper"), tool)
     first = first if first in drawn else tool
     within = [first]
     for index in range(first + 1, model.nbody):  # a body comes after the one that it hangs on

@@ -41,8 +41,8 @@ class Card:
     """Of the device, in force now."""
     trouble: str = ""
     """With a device, and what to do."""
-    grip: bool = False
-    """Whether the gripper shall be closed."""
+    grips: Sequence[bool] = (False,)
+    """Which grippers shall be closed, one a hand."""
     apart: float | None = None
     """How far a leader arm stands from the robot's arm, at most [rad]; none without a leader."""
 
@@ -65,7 +65,11 @@ class Card:
             chosen.append(f"the {setting.focus}")
         if meaning.mask(setting)[meaning.channels.hands_slice].any():
             chosen.append(f"frame {setting.frame}")
-        chosen += [f"speed {setting.speed:.0%}", f"gripper {'closed' if self.grip else 'open'}"]
+        if len(meaning.hands) > 1:
+            chosen.append(f"active hand {setting.hand}")
+        chosen.append(f"speed {setting.speed:.0%}")
+        for hand, closed in zip(meaning.hands, self.grips, strict=True):
+            chosen.append(f"{hand} gripper {'closed' if closed else 'open'}".strip())
         chosen += [] if self.apart is None else [f"leader {np.degrees(self.apart):.0f}° from the arm"]
         left = max(0.0, self.horizon - view.state.time)
         return (
@@ -91,7 +95,7 @@ class Card:
 
     def _help(self) -> Table:
         table = Table.grid(padding=(0, 2))
-        rows = moves_help(self.moves)
+        rows = moves_help(self.moves, self.person.meaning.parts(self.person.setting))
         rows += [line for controls in self.tables for line in actions_help(controls)]
         half = (len(rows) + 1) // 2
         for left, right in zip(rows[:half], [*rows[half:], ("", "")], strict=False):

@@ -1,8 +1,10 @@
 """What the controls of a device mean: one table, from a file, that a person may change.
 
-A section says which axis a control moves while that part is steered: `[hand]`, `[turn]` (of the hand),
-`[base]`, `[both]` (hand and base at once) and `[joints]`; `[actions]` says what a press asks for. Parts that
-need the same controls are banks: the action `focus` goes from one to the next.
+A section says which axis a control moves while that part is steered: `[hand]` (one of several, or both as a
+pair), `[turn]` (of the hand), `[apart]` (of a pair), `[hands]` and `[hands_turn]` (two at once), `[base]`,
+`[both]` (hand and base at once) and `[joints]`; `[actions]` says what a press asks for, `[hand_actions]` what
+it asks for instead on a robot with several hands. A control that moves something asks for nothing but the
+stop. Parts that need the same controls are banks: the action `focus` goes from one to the next.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,9 +17,13 @@ from handrail.controllers.interface.channels import BASE, TOOL
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import check, check_names
 
+FIRST, SECOND = (tuple(axis.replace("ee", name) for axis in TOOL) for name in ("one", "two"))
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     "hand": TOOL,
     "turn": TOOL,
+    "apart": ("apart.v",),
+    "hands": (*FIRST, *SECOND, *TOOL),
+    "hands_turn": (*FIRST, *SECOND, *TOOL),
     "base": BASE,
     "both": (*BASE, *TOOL),
     "joints": tuple(f"joint.{number}" for number in range(1, 8)),
@@ -30,6 +36,9 @@ ACTIONS: Mapping[str, str] = {
     "pause": "pause",
     "stop": "emergency stop",
     "grip": "close or open the gripper",
+    "grip_left": "close or open the first gripper",
+    "grip_right": "close or open the second gripper",
+    "hand": "the other hand",
     "focus": "hand or base; the next joints",
     "mode": "next mode",
     "mode_back": "mode before",
@@ -47,6 +56,7 @@ ACTIONS: Mapping[str, str] = {
     "help": "show or hide this help",
 }
 HOLD, CLUTCH = "hold", "clutch"  # actions that last as long as the control is down
+STOP = "stop"
 _FOLDER = Path(__file__).parent / "maps"
 
 Moves = Mapping[str, tuple[str, int]]  # axis and sign of each control
@@ -59,6 +69,8 @@ class Steered(NamedTuple):
     base: bool
     arm: tuple[str, ...] = ()
     """Channels of the arm's joints; the section's are counted from the first."""
+    hands: bool = False  # two at once
+    apart: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,7 +99,8 @@ class ControlMap:
             meant[HOLD] = 1.0
         for control, (axis, sign) in moves.items() if HOLD in meant else ():
             meant[axis] = meant.get(axis, 0.0) + sign * said.deflections.get(control, 0.0)
-        asked = tuple(actions[name] for name in presses if name in actions)
+        free = [name for name in presses if name in actions and (name not in moves or actions[name] == STOP)]
+        asked = tuple(actions[name] for name in free)
         return replace(said, deflections=meant, presses=asked)
 
     def only(self, *sections: str) -> "ControlMap":
@@ -99,6 +112,8 @@ class ControlMap:
         of, arm = self.moves.get, steered.arm
         both = "both" if steered.base and of("both") else "hand"
         parts = [of(both, {}), of("turn", {})] if steered.hand else []
+        parts = [of("hands", {}), of("hands_turn", {})] if steered.hands else parts
+        parts += [of("apart", {})] if steered.apart else []
         joints = of("joints", {})
         at_once = len({axis for axis, _ in joints.values()}) or 1
         for first in range(0, len(arm), at_once):
@@ -117,13 +132,14 @@ class ControlMap:
         return list(banks)
 
 
-def load_map(device: str, controls: Iterable[str], changes: str = "") -> ControlMap:
+def load_map(device: str, controls: Iterable[str], changes: str = "", hands: int = 1) -> ControlMap:
     """Return the table of a device, with a person's changes.
 
     Args:
         device: its name.
         controls: that it has.
         changes: a .toml file of the same form, with the sections and controls that differ, or an empty path.
+        hands: how many the robot has.
     """
     table = read_toml(_FOLDER / f"{device}.toml", "controls")
     if changes:
@@ -132,7 +148,8 @@ def load_map(device: str, controls: Iterable[str], changes: str = "") -> Control
         _check(changed, dict.fromkeys(sorted(controls)), f"--teleop.map {path}")
         table = {name: table.get(name, {}) | changed.get(name, {}) for name in {**table, **changed}}
     given = {name: {at: value for at, value in table[name].items() if value} for name in table}
-    actions = given.pop("actions")
+    actions, of_hands = given.pop("actions"), given.pop("hand_actions")
+    actions |= of_hands if hands > 1 else {}
     return ControlMap({name: _moves(section) for name, section in given.items()}, actions)
 
 
@@ -143,7 +160,7 @@ def _moves(section: Mapping[str, str]) -> Moves:
 def _check(table: dict[str, Any], controls: Mapping[str, Any], where: str) -> None:
     """Check a person's table; an empty text takes a meaning away."""
     meanings = {name: (*axes, *(f"-{axis}" for axis in axes)) for name, axes in SECTIONS.items()}
-    meanings["actions"] = tuple(ACTIONS)
+    meanings["actions"] = meanings["hand_actions"] = tuple(ACTIONS)
     check_names(table, meanings, where)
     for name, section in table.items():
         check_names(check(section, dict[str, Any], f"{where}: [{name}]"), controls, f"{where}: [{name}]")
@@ -158,6 +175,7 @@ _WAYS = {
     "wx": ("rolls right", "left"),
     "wy": ("tips down", "up"),
     "wz": ("turns left", "right"),
+    "v": ("apart", "together"),
 }
 _CONTROLS = {
     "left_x": "left stick ↔",
@@ -175,15 +193,21 @@ def control_name(control: str) -> str:
     return _CONTROLS.get(control, control.replace("_", " "))
 
 
-def moves_help(moves: Moves) -> list[tuple[str, str]]:
-    """Return what moves what: controls, and in words what they do."""
+def moves_help(moves: Moves, parts: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return what moves what: controls, and in words what they do.
+
+    Args:
+        moves: in force now.
+        parts: names of what parts of axes stand for.
+    """
     lines = []
     for axis in dict.fromkeys(axis for axis, _ in moves.values()):
         of_axis = {control: sign for control, (name, sign) in moves.items() if name == axis}
         part, _, way = axis.partition(".")
         joint = way.removesuffix("_joint").replace("_", " ")
         there, back = _WAYS.get(way, (f"{joint} +", "−"))
-        said = there if part == "joint" else f"{'hand' if part == 'ee' else part} {there}"
+        name = {"ee": "hand", "pair": "both hands", "apart": "hands"}.get(parts.get(part, part))
+        said = there if part == "joint" else f"{name or parts.get(part, part)} {there}"
         controls = sorted(of_axis, key=lambda control: -of_axis[control])
         lines.append((" / ".join(map(control_name, controls)), f"{said} / {back}"))
     return lines

@@ -44,6 +44,9 @@ def choice_of(action: str, person: Person) -> Ask | None:
         case "focus":
             focus = "hand" if setting.focus == "base" else "base"
             return Ask("focus", focus) if setting.mode.by_focus else None
+        case "hand":
+            hands = person.meaning.hands
+            return Ask("hand", hands[(hands.index(setting.hand) + 1) % len(hands)])
         case "practice":
             return Ask("practice", not person.practises)
     return Ask(action) if action in ASKS else None
@@ -69,7 +72,7 @@ class LocalPerson:
         self._person, self._main, self._beside, self._follower = person, main, beside, follower
         self._sources = [main, beside] if beside else [main]
         self._card = Card(person, main.device.name, [source.controls for source in self._sources])
-        self._grip = False
+        self._grips = [False] * len(person.meaning.hands)
 
     def __rich__(self) -> RenderableType:
         """Return what the terminal shows."""
@@ -86,7 +89,7 @@ class LocalPerson:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
-        self._grip, self._card.brakes = False, ""
+        self._grips, self._card.brakes = [False] * len(self._grips), ""
         self._person.reset(view, rng)
 
     def act(self, view: View) -> Intent | EpisodeEvent:
@@ -97,7 +100,7 @@ class LocalPerson:
         self._take(said[0], said[-1] if self._follower else said[0], view)
         answer, card = self._person.act(view), self._card
         moving = self._sources[-1] if self._follower else self._main
-        card.view, card.moves, card.grip = view, moving.moves(self._steered), self._grip
+        card.view, card.moves, card.grips = view, moving.moves(self._steered), tuple(self._grips)
         card.trouble = self._main.trouble or moving.trouble
         return answer
 
@@ -123,7 +126,8 @@ class LocalPerson:
         joints = mask[channels.joint_slice]
         arm = tuple(name for name, owned in zip(channels.joints[base:], joints[base:], strict=True) if owned)
         drives = bool(mask[channels.base_slice].any() or (base and joints[:base].all()))
-        return Steered(bool(mask[channels.hands_slice].any()), drives, arm)
+        parts, pair = meaning.parts(self._person.setting), mask[channels.pair_slice]
+        return Steered(bool(parts), drives, arm, "two" in parts, bool(pair[6:].any()))
 
     def _take(self, main: DeviceInput | None, other: DeviceInput | None, view: View) -> None:
         """Tell the person where the inputs are; that nobody drives, while a device that is needed is gone.
@@ -141,19 +145,26 @@ class LocalPerson:
         if self._follower:
             clutch = on and CLUTCH in other.deflections
             targets = self._follower.targets(main.joints, clutch, view.state.q)
-            self._grip = self._follower.grips(main.joints, self._grip)
+            self._grips[0] = self._follower.grips(main.joints, self._grips[0])
             self._card.apart = self._follower.apart(main.joints, view.state.q)
         else:
             on = on and HOLD in main.deflections
-        names = self._person.meaning.channels.names
-        axes = tuple(float(np.clip(other.deflections.get(name, 0.0), -1.0, 1.0)) for name in names)
-        inputs = Input(on, self._main.device.name, self._grip, axes, 0.0, targets)
+        said, names = dict[str, float](), self._person.meaning.channels.names
+        parts = self._person.meaning.parts(self._person.setting)
+        for axis, value in other.deflections.items():
+            part, _, way = axis.partition(".")
+            name = f"{parts[part]}.{way}" if part in parts else axis
+            said[name] = said.get(name, 0.0) + value
+        axes = tuple(float(np.clip(said.get(name, 0.0), -1.0, 1.0)) for name in names)
+        inputs = Input(on, self._main.device.name, tuple(self._grips), axes, 0.0, targets)
         self._person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
 
     def _do(self, action: str) -> None:
         """Do what a control asks for."""
-        if action == "grip":
-            self._grip = not self._grip
+        hands = self._person.meaning.hands
+        grips = {"grip": hands.index(self._person.setting.hand), "grip_left": 0, "grip_right": len(hands) - 1}
+        if action in grips:
+            self._grips[grips[action]] ^= True
         elif action == "help":
             self._card.is_helping = not self._card.is_helping
         elif action == "focus" and not self._main.next_bank(self._steered):

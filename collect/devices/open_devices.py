@@ -46,9 +46,10 @@ def open_device(
         say: is told what to hold.
         modes: that one can change to; all by default.
     """
-    main, beside = _reader(config.operator, config.teleop), None
+    hands = len(env.model.description.hands)
+    main, beside = _reader(config.operator, config.teleop, hands), None
     if config.operator != "keyboard" and has_terminal():
-        beside = _reader("keyboard", TeleopConfig())
+        beside = _reader("keyboard", TeleopConfig(), hands)
         beside.controls = beside.controls.only()
     person = _person(config, env, modes or build_modes(config, env), main, beside)
     say(f"{config.operator}: hold {control_of([main.controls], HOLD) or 'what moves'} to move")
@@ -63,22 +64,22 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     twin = None if file.is_file() else same_arm(teleop, arm)
     calibration = twin or load_calibration(file, arm, how_to_calibrate(teleop, config.robot))
     main = DeviceReader(LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources))
-    beside = _reader(teleop.beside, teleop)
+    beside = _reader(teleop.beside, teleop, len(description.hands))
     beside.controls = beside.controls.only("base")
     person = _person(config, env, modes, main, beside, Follower(env.model, calibration))
     say(f"{teleop.type}: hold {control_of([beside.controls], CLUTCH)} on the {teleop.beside} to move the arm")
     return person
 
 
-def _reader(name: str, teleop: TeleopConfig) -> DeviceReader:
-    """Return the reader of a device, with the map of the settings."""
+def _reader(name: str, teleop: TeleopConfig, hands: int) -> DeviceReader:
+    """Return the reader of a device, with the map of the settings for so many hands."""
     shape = StickShape(teleop.dead_zone, teleop.exponent)
     device, controls = {
         "gamepad": (Gamepad(shape), gamepad.CONTROLS),
         "spacemouse": (SpaceMouse(shape), spacemouse.CONTROLS),
         "keyboard": (Keyboard(), NAMES),
     }[name]
-    return DeviceReader(device, load_map(name, controls, teleop.map))
+    return DeviceReader(device, load_map(name, controls, teleop.map, hands))
 
 
 def _person(

@@ -99,5 +99,6 @@ def pressed(action: Mapping[str, float]) -> str:
 
 def mode_loop(env: HandrailEnv, task: str, mode: TeleopMode, also: TeleopMode) -> EpisodeLoop:
     """Return the loop of an environment in a mode; intents of another one are completed, too."""
-    build = partial(build_controller, model=env.model, fps=env.fps, task=task)
-    return EpisodeLoop(env, ModeController({each.name: each for each in (also, mode)}, build, mode))
+    build = partial(build_controller, fps=env.fps, task=task)
+    modes = {each.name: each for each in (also, mode)}
+    return EpisodeLoop(env, ModeController(modes, build, mode, env.model))

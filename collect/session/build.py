@@ -98,10 +98,10 @@ def build_session(
     control_fps = config.control_fps or fps
     mode = build_mode(config, env.model)
     operator = person or build_operator(config, mode, env.model)
-    build = partial(build_controller, model=env.model, fps=control_fps, task=config.task)
+    model, build = env.model, partial(build_controller, fps=control_fps, task=config.task)
     return Session(
         env,
-        ModeController(build_modes(config, env), build, mode) if person else build(mode),
+        ModeController(build_modes(config, env), build, mode, model) if person else build(mode, model),
         operator,
         observers,
         realtime=(config.realtime or person is not None) and not env.real,

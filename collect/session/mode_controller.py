@@ -1,11 +1,15 @@
-"""A controller for each teleop mode, so that an operator may change the mode while the robot moves."""
+"""A controller for each teleop mode, so that an operator may change mode and hand while the robot moves."""
 
 from collections.abc import Callable, Mapping
 
 from handrail.collect.operators.modes import MASK, TeleopMode, always
+from handrail.controllers.arrays import BoolArray
+from handrail.controllers.baselines.catalogue import CONTROLLERS
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 
@@ -16,15 +20,22 @@ class ModeController:
 
     Args:
         modes: by name.
-        build: makes the controller of a mode; modes that say the same one share it.
+        build: makes the controller of a mode and a model; modes that say the same one share it.
         first: the mode at the beginning.
+        model: of the robot.
     """
 
     def __init__(
-        self, modes: Mapping[str, TeleopMode], build: Callable[[TeleopMode], Controller], first: TeleopMode
+        self,
+        modes: Mapping[str, TeleopMode],
+        build: Callable[[TeleopMode, RobotModel], Controller],
+        first: TeleopMode,
+        model: RobotModel,
     ) -> None:
         self._modes, self._build = modes, build
-        self._built: dict[tuple[str, bool], Controller] = {}
+        self._model = self._meant = model
+        self._channels = Channels.of(model.description)
+        self._built: dict[tuple[str, bool, int], Controller] = {}
         self._obstacles: tuple[Obstacle, ...] = ()
         self._mode = first
 
@@ -41,16 +52,25 @@ class ModeController:
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command of the mode's controller."""
         before, self._mode = self._controller, self._found(intent.mode)
+        self._meant = self._of_hand(intent.mask)
         if self._controller is not before:
             self._controller.reset(self._obstacles)
         return self._controller.update(state, intent)
 
     @property
     def _controller(self) -> Controller:
-        which = self._mode.controller, self._mode.task_objectives
+        which = self._mode.controller, self._mode.task_objectives, self._meant.number
         if which not in self._built:
-            self._built[which] = self._build(self._mode)
+            self._built[which] = self._build(self._mode, self._meant)
         return self._built[which]
+
+    def _of_hand(self, mask: BoolArray) -> RobotModel:
+        """Return the model that means the hand which is commanded; the masked MPC knows them all."""
+        if not CONTROLLERS.find(self._mode.controller).objectives:
+            for number, hand in enumerate(self._model.description.hands):
+                if mask[self._channels.hand_slice(number)].any():
+                    return self._model.with_hand(hand.name)
+        return self._model
 
     def _found(self, name: str) -> TeleopMode:
         """Return a mode; a mask of one's own is for the MPC, an unknown name changes nothing."""

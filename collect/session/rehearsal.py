@@ -26,7 +26,7 @@ class Rehearsal:
 
     def __init__(self, model: RobotModel, modes: Mapping[str, TeleopMode]) -> None:
         self._modes = tuple(modes.values())
-        self._meaning = InputMeaning(model, self._modes[0])
+        self._meaning, self._hand = InputMeaning(model, self._modes[0]), model.hand.name
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin."""
@@ -38,12 +38,13 @@ class Rehearsal:
         if isinstance(now, EpisodeEvent):
             return now
         axes = (_DEFLECTION,) * self._meaning.channels.size
-        return self._meaning.intent(Input(True, "rehearsal", False, axes, 0.0, ()), now, view.state)
+        grips = (False,) * len(self._meaning.hands)
+        return self._meaning.intent(Input(True, "rehearsal", grips, axes, 0.0, ()), now, view.state)
 
     def _all(self) -> Iterator[Setting | EpisodeEvent]:
         for mode in self._modes:
             for focus in ("hand", "base") if mode.by_focus else ("hand",):
-                yield from (Setting(mode, focus) for _ in range(_PERIODS))
+                yield from (Setting(mode, focus, self._hand) for _ in range(_PERIODS))
         yield from (EpisodeEvent.PAUSE for _ in range(_BRAKING))
         yield EpisodeEvent.UNDO
-        yield from (Setting(self._modes[0]) for _ in range(_PERIODS))
+        yield from (Setting(self._modes[0], hand=self._hand) for _ in range(_PERIODS))

@@ -36,7 +36,7 @@ class LoopState(NamedTuple):
     planned: float = 0.0  # how long the command follows its plan [s]
     rest: FloatArray | None = None
     """Where joints stay that move no steered hand, (n,); NaN of the others. None of a robot with one hand."""
-    paired: bool = False  # whether two hands are being steered as a pair
+    paired: tuple[bool, bool] = False, False  # whether two hands are being steered as a pair, and parted
     active: IntArray = NOTHING_ACTIVE
     """Names of the rows that were active in the last problem among these pairs."""
 

@@ -105,11 +105,12 @@ class MaskedMpc:
         return self._builder.build(self._facing(self.loop, state, intent), state, intent)
 
     def _facing(self, loop: LoopState, state: State, intent: Intent) -> LoopState:
-        """Return the loop's state in which a problem is built; a pair of hands is kept as it begins."""
+        """Return the loop's state in which a problem is built; a pair is kept as it begins, or was parted."""
         if not self.channels.pair:
             return loop.facing(state, intent, self.channels)
-        steered = bool(intent.mask[self.channels.pair_slice].any())
-        if steered and not loop.paired and TOGETHER in self.residuals.names:
+        pair = intent.mask[self.channels.pair_slice]
+        steered = bool(pair.any()), bool(pair[-1])
+        if steered[0] and steered != loop.paired and TOGETHER in self.residuals.names:
             parameters = loop.parameters.copy()
             parameters[self.residuals.parameter_slice(TOGETHER)] = together_parameters(
                 self.model, state.expected

@@ -21,7 +21,7 @@ from websockets.typing import Origin
 FROM = "127.0.0.3"
 TRUSTING = ssl.create_default_context()
 TRUSTING.check_hostname, TRUSTING.verify_mode = False, ssl.CERT_NONE
-GOOD = {"kind": "drive", "seq": 1, "echo": 0.0, "on": True, "device": "keyboard", "grip": False}
+GOOD = {"kind": "drive", "seq": 1, "echo": 0.0, "on": True, "device": "keyboard", "grips": [False]}
 GOOD |= {"axes": [1.0] * 18, "view": 0.0, "targets": []}
 MESSAGES, CONNECTIONS = 5_000, 500
 _REFUSED = (OSError, InvalidHandshake, ConnectionClosed, TimeoutError, EOFError)

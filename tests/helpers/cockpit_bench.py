@@ -94,9 +94,9 @@ class Bench:
 
 
 @contextmanager
-def bench(mode="ee"):
+def bench(mode="ee", **options):
     """Run a cockpit on a bench."""
-    with environment("Reach", render_mode="rgb_array") as env:
+    with environment("Reach", render_mode="rgb_array", **options) as env:
         made = Bench(env, mode)
         made.start()
         try:

@@ -61,8 +61,8 @@ def ask(served, path, data=None, **headers):
 def drive(sequence=1, echo=None, axes=(0.0,) * 18, **changes):
     """Return a message of a page; one that answers this very moment, if it does not say which."""
     echo = time.monotonic() if echo is None else echo
-    said = {"kind": "drive", "seq": sequence, "echo": echo, "on": True, "device": "keyboard", "grip": False}
-    return json.dumps({**said, "axes": list(axes), "view": 0.0, "targets": [], **changes})
+    said = {"kind": "drive", "seq": sequence, "echo": echo, "on": True, "device": "keyboard"}
+    return json.dumps({**said, "grips": [False], "axes": list(axes), "view": 0.0, "targets": [], **changes})
 
 
 def show(served, **frame):

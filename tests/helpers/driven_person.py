@@ -39,22 +39,25 @@ LEADER = LeaderCalibration(
 class Driven:
     """A person with devices that a test moves."""
 
-    def __init__(self, device, mode="ee", beside="", follower=None):
-        self.clock = Clock()
-        self.person = Person(MODEL, fitting(MODES, 1), mode, self.clock)
+    def __init__(self, device, mode="ee", beside="", follower=None, model=MODEL):
+        self.clock, self.model = Clock(), model
+        hands = len(model.description.hands)
+        self.person = Person(model, fitting(MODES, hands), mode, self.clock)
         self.person.ask(Ask("frame", "base"))
-        controls = load_map(device, CONTROLS[device]) if device in CONTROLS else ControlMap({}, {})
+        controls = (
+            load_map(device, CONTROLS[device], hands=hands) if device in CONTROLS else ControlMap({}, {})
+        )
         self.main, self.beside = PlayedReader(device, self.clock, controls), None
         if beside:
             table = load_map(beside, CONTROLS[beside]).only(*(["base"] if follower else []))
             self.beside = PlayedReader(beside, self.clock, table)
         self.local = LocalPerson(self.person, self.main, self.beside, follower)
-        self.q, self.time = HOME.copy(), 0.0
+        self.q, self.time = np.array(model.description.home), 0.0
         self.local.reset(self.view(), np.random.default_rng(0))
 
     def view(self):
-        task = SimpleNamespace(goal=Pose(np.array([1.0, 0.0, 1.0]), np.eye(3)), tool=MODEL.pose(self.q))
-        return View(State(self.q, np.zeros(MODEL.size), self.time), task)
+        task = SimpleNamespace(goal=Pose(np.array([1.0, 0.0, 1.0]), np.eye(3)), tool=self.model.pose(self.q))
+        return View(State(self.q, np.zeros(self.model.size), self.time), task)
 
     def act(self, seconds=0.05) -> Any:
         self.clock.now += seconds

@@ -1,6 +1,7 @@
 // What the hand is to do, drawn: its axes and those of where it is to be brought, straight lines down from both to the
 // floor, and how near is near enough.
 import { THREE } from "./three.min.js";
+import { COLOURS } from "./hands.js";
 import { place } from "./scene.js";
 
 const HAND = 0x00a0a8, AIM = 0xe3b505, WITHIN = 0x2fbf71;
@@ -50,8 +51,9 @@ export class AimMarks {
     scene.add(...this.all);
   }
 
-  frame({ tool, aim }) {
-    place(this.hand, tool);
+  frame({ tools, hand, aim }) {
+    place(this.hand, tools[hand]);
+    for (const { material } of tools.length > 1 ? this.below[0].children : []) material.color.set(COLOURS[hand]);
     drop(this.below[0], this.hand.position, this.scale);
     for (const each of [this.hand, this.below[0]]) each.visible = true;
     for (const each of [this.hand, this.aim]) each.scale.setScalar(this.scale);
@@ -63,7 +65,7 @@ export class AimMarks {
     this.near.visible = aim.distance > 0;
     this.near.position.copy(this.aim.position);
     this.near.scale.setScalar(aim.distance || 1);
-    const isWithin = this.hand.position.distanceTo(this.aim.position) <= aim.distance;
+    const isWithin = new THREE.Vector3(...tools[aim.hand]).distanceTo(this.aim.position) <= aim.distance;
     this.near.material.color.set(isWithin ? WITHIN : AIM);
   }
 

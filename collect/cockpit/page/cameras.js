@@ -53,12 +53,12 @@ export class Cameras {
     return names[(names.indexOf(this.choice) + 1) % names.length];
   }
 
-  // base, tool: their poses as (position, quaternion); aim: where the hand is to be brought, if that is known.
-  frame(base, tool, aim) {
+  // base, tool, tools: of base, active hand and all hands, as (position, quaternion); aim: where a hand is to be brought, if that is known.
+  frame(base, tool, tools, aim) {
     if (this.choice === "hand") return this.ride(tool);
     if (this.choice === "free" && this.placed) return undefined;
     if (!this.placed) this.begin(base);
-    const spheres = this.spheres(base.position, tool.position, aim);
+    const spheres = this.spheres(base.position, tool.position, tools.map(({ position }) => position), aim);
     const { position } = this.camera, { target } = this.controls, now = performance.now();
     this.zoom *= position.distanceTo(target) / this.placed.distance;
     this.pan.add(target).sub(this.placed.target);
@@ -85,10 +85,10 @@ export class Cameras {
   }
 
   // What is to be in view, {at, room}: hand and aim; the base too, as long as these are apart.
-  spheres(base, tool, aim) {
+  spheres(base, tool, tools, aim) {
     const share = !aim ? 1 : this.isLow ? 0 : THREE.MathUtils.clamp((tool.distanceTo(aim) / this.scale - CLOSE) / (FAR - CLOSE), 0, 1);
     const body = { at: tool.clone().lerp(base, share), room: (ROOM + share * (BASE - ROOM)) * this.scale };
-    return [body, ...[tool, aim].filter(Boolean).map((at) => ({ at, room: ROOM * this.scale }))];
+    return [body, ...[...tools, aim].filter(Boolean).map((at) => ({ at, room: ROOM * this.scale }))];
   }
 
   // Where to look, and from how far, so that all spheres are in the free area: {target, distance}.

@@ -1,5 +1,5 @@
 // A gamepad: moves only while its dead-man button is held; unplugged, it has let go.
-import { ACTIONS, HELD } from "./keymap.js";
+import { HELD } from "./keymap.js";
 import { shaped } from "./inputs.js";
 
 const PUSHED = 0.6; // of a stick that is to be chosen
@@ -72,9 +72,10 @@ export class Gamepad {
   }
 
   actions() {
-    const now = Object.fromEntries([...Object.keys(ACTIONS), "turn"].map((name) => [name, this.isPressed(name)]));
+    const offered = Object.keys(this.inputs.mapping.offered);
+    const now = Object.fromEntries([...offered, "turn"].map((name) => [name, this.isPressed(name)]));
     if (this.was && this.inputs.isHere) {
-      for (const name of Object.keys(ACTIONS)) if (now[name] && !this.was[name]) this.act(name);
+      for (const name of offered) if (now[name] && !this.was[name]) this.act(name);
       if (now.turn && !this.was.turn && !this.inputs.owned.has("ee.wx")) this.inputs.nextBank();
     }
     this.was = now;

@@ -1,6 +1,6 @@
 // The card of keys, buttons and sticks, drawn from the mapping in force; a click changes one.
 import { buttonName } from "./gamepad.js";
-import { ACTIONS, HELD, axisName, keyName } from "./keymap.js";
+import { axisName, keyName } from "./keymap.js";
 import { STICK_AXES, STOP } from "./mapping.js";
 
 const byId = (id) => document.getElementById(id);
@@ -67,20 +67,20 @@ export class Help {
   keys() {
     const { inputs } = this;
     return table(inputs.entriesInForce().map((entry) => [
-      axisName(entry[1], entry[2]), keyName(entry[0]), (button) => this.key(button, (code) => inputs.mapping.setKey(entry, code, inputs.owned)),
+      axisName(inputs.channelOf(entry[1]), entry[2]), keyName(entry[0]), (button) => this.key(button, (code) => inputs.mapping.setKey(entry, code, inputs.owned)),
     ]));
   }
 
   actions() {
     const { mapping } = this.inputs;
-    return table(Object.entries(ACTIONS).map(([name, { says }]) => [
+    return table(Object.entries(mapping.offered).map(([name, { says }]) => [
       says, keyName(mapping.actions[name]), mapping.actions[name] === STOP ? null : (button) => this.key(button, (code) => mapping.setAction(name, code)),
     ]));
   }
 
   buttons(pad) {
     const { mapping } = this.inputs;
-    return table(Object.entries({ ...HELD, ...ACTIONS }).map(([name, { says }]) => [
+    return table(Object.entries({ ...mapping.held, ...mapping.offered }).map(([name, { says }]) => [
       says, buttonName(mapping.buttons[name], pad), (button) => this.pad(button, "button", "press a button", (index) => mapping.setButton(name, index)),
     ]));
   }

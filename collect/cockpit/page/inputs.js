@@ -32,7 +32,8 @@ export class Inputs {
     this.sources = [keyboard]; // each {device, moves(), letGo(), targets where it has some}
     this.mapping = null;
     this.device = "keyboard";
-    this.grip = false;
+    this.grips = [false]; // which grippers shall be closed, one a hand
+    this.parts = {}; // what parts of axes stand for, where there are several hands
     this.turns = false; // whether sticks turn the hand
     this.bank = 0; // which of what they can move the sticks move
     this.hasFocus = document.hasFocus();
@@ -91,6 +92,16 @@ export class Inputs {
     return this.entriesInForce().filter(([code]) => this.held.has(code)).map(([, axis, sign]) => [axis, sign]);
   }
 
+  // The channel that an axis of keys and sticks is now.
+  channelOf(axis) {
+    const [part, way] = axis.split(".");
+    return part in this.parts ? `${this.parts[part]}.${way}` : axis;
+  }
+
+  flipGrip(hand) {
+    this.grips = this.grips.map((isClosed, index) => (index === hand ? !isClosed : isClosed));
+  }
+
   // Which axes two sticks move now.
   sticks() {
     return this.bankOf().sticks;
@@ -108,7 +119,7 @@ export class Inputs {
     return this.hasFocus && !document.hidden;
   }
 
-  // Returns {axes, device, on, grip, targets}; `channels` names the axes.
+  // Returns {axes, device, on, grips, targets}; `channels` names the axes.
   read(channels) {
     const sums = new Map();
     let targets = [];
@@ -116,10 +127,10 @@ export class Inputs {
       const moves = source.moves().filter(([, value]) => value);
       const wanted = source.targets ?? [];
       if (moves.length || wanted.length) this.device = source.device;
-      for (const [axis, value] of moves) sums.set(axis, (sums.get(axis) ?? 0) + value);
+      for (const [axis, value] of moves) sums.set(this.channelOf(axis), (sums.get(this.channelOf(axis)) ?? 0) + value);
       if (wanted.length) targets = [...wanted];
     }
     const axes = channels.map((name) => (this.isHere ? Math.max(-1, Math.min(1, sums.get(name) ?? 0)) : 0));
-    return { axes, device: this.device, on: this.isHere, grip: this.grip, targets: this.isHere ? targets : [] };
+    return { axes, device: this.device, on: this.isHere, grips: this.grips, targets: this.isHere ? targets : [] };
   }
 }

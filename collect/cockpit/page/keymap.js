@@ -9,11 +9,12 @@ export const AXES = {
   "ee.wx": ["hand rolls left", "hand rolls right"],
   "ee.wy": ["hand tips up", "hand tips down"],
   "ee.wz": ["hand turns right", "hand turns left"],
+  "apart.v": ["hands together", "hands apart"],
 };
 // The same in a word, both ways.
 export const SHORT = {
   "ee.vx": "forward", "ee.vy": "sideways", "ee.vz": "up", "ee.wx": "roll", "ee.wy": "tip", "ee.wz": "turn",
-  "base.vx": "drive", "base.vy": "sideways", "base.wz": "turn",
+  "base.vx": "drive", "base.vy": "sideways", "base.wz": "turn", "apart.v": "apart",
 };
 const HAND = [
   ["KeyW", "ee.vx", 1], ["KeyS", "ee.vx", -1], ["KeyA", "ee.vy", 1], ["KeyD", "ee.vy", -1],
@@ -24,6 +25,10 @@ const BASE = [
   ["KeyI", "base.vx", 1], ["KeyK", "base.vx", -1], ["KeyJ", "base.vy", 1], ["KeyL", "base.vy", -1],
   ["KeyU", "base.wz", 1], ["KeyO", "base.wz", -1],
 ];
+const SECOND = [ // of two hands that are steered at once; the first one has the hand's keys
+  ["KeyI", "two.vx", 1], ["KeyK", "two.vx", -1], ["KeyJ", "two.vy", 1], ["KeyL", "two.vy", -1], ["KeyU", "two.vz", 1], ["KeyO", "two.vz", -1],
+];
+const APART = [["Digit0", "apart.v", 1], ["Digit9", "apart.v", -1]];
 const BELOW = ["KeyZ", "KeyX", "KeyC", "KeyV", "KeyB", "KeyN", "KeyM"];
 
 // What is done once: its words, its key, its button on a gamepad (of the standard layout; -1: none).
@@ -47,6 +52,18 @@ export const ACTIONS = {
   faster: { says: "faster", key: "Equal", button: 10 },
   help: { says: "this card", key: "KeyH", button: -1 },
 };
+// What is done once with this robot: where it has several hands, each gripper has a key and a trigger of its own.
+export function actionsOf({ hands }) {
+  if (hands.length < 2) return ACTIONS;
+  const { grip, ...others } = ACTIONS;
+  const gripOf = ({ name }) => grip.says.replace("the", `the ${name}`);
+  return {
+    hand: { says: "the other hand", key: "Slash", button: 0 },
+    grip_left: { says: gripOf(hands[0]), key: "ShiftLeft", button: 6 },
+    grip_right: { says: gripOf(hands[1]), key: "ShiftRight", button: 7 },
+    ...others,
+  };
+}
 // What is held on a gamepad.
 export const HELD = {
   deadman: { says: "hold to move", button: 4 },
@@ -54,29 +71,43 @@ export const HELD = {
   up: { says: "hand up", button: 7 },
   down: { says: "hand down", button: 6 },
 };
+export function heldOf({ hands }) {
+  const { up, down, ...others } = HELD;
+  return hands.length < 2 ? HELD : others; // the triggers are the grippers'
+}
 export const STICKS = {
   hand: [[0, "ee.vy", -1], [1, "ee.vx", -1], [2, "ee.wz", -1], [3, "ee.vz", -1]],
   turn: [[0, "ee.wx", 1], [1, "ee.wy", -1], [2, "ee.wz", -1]], // while "turn" is held
   base: [[0, "base.vy", -1], [1, "base.vx", -1], [2, "base.wz", -1]],
   both: [[0, "base.wz", -1], [1, "base.vx", -1], [2, "ee.vy", -1], [3, "ee.vx", -1]],
+  hands: [[0, "one.vy", -1], [1, "one.vx", -1], [2, "two.vy", -1], [3, "two.vx", -1]],
+  hands_turn: [[0, "one.wz", -1], [1, "one.vz", -1], [2, "two.wz", -1], [3, "two.vz", -1]],
+  apart: [[3, "apart.v", -1]], // of a pair, while "turn" is held
 };
 
 // The keys of the arm's joints are drawn from the robot: a digit turns one way, the key below it the other way.
 export function defaultKeys(stage) {
   const arm = stage.joints.slice(stage.base, stage.base + BELOW.length);
   const joints = arm.flatMap((name, index) => [[`Digit${index + 1}`, `joint.${name}`, 1], [BELOW[index], `joint.${name}`, -1]]);
-  return [...HAND, ...BASE, ...joints];
+  const first = HAND.slice(0, SECOND.length).map(([code, axis, sign]) => [code, axis.replace("ee", "one"), sign]);
+  return [...HAND, ...BASE, ...joints, ...(stage.hands.length > 1 ? [...first, ...SECOND, ...APART] : [])];
 }
 
 export const BY_JOINTS = "base by its joints"; // owned: keys and sticks of the base mean its joints
 
 const drives = (axis, owned) => owned.has(axis) || (axis.startsWith("base.") && owned.has(BY_JOINTS));
 
-// Which of the entries count now: those of what is owned; of two on one key, the hand's.
+const FIRST = [["one.", "two."], ["ee.", "apart."], [""]]; // of two on one key, the hand's; of both hands, each one's
+
+// Which of the entries count now: those of what is owned.
 export function inForce(entries, owned) {
-  const hand = entries.filter(([, axis]) => axis.startsWith("ee.") && owned.has(axis));
-  const taken = new Set(hand.map(([code]) => code));
-  return [...hand, ...entries.filter(([code, axis]) => !axis.startsWith("ee.") && !taken.has(code) && drives(axis, owned))];
+  const found = [], taken = new Set();
+  for (const parts of FIRST) {
+    const more = entries.filter((entry) => !found.includes(entry) && !taken.has(entry[0]) && parts.some((part) => entry[1].startsWith(part)) && drives(entry[1], owned));
+    found.push(...more);
+    for (const [code] of more) taken.add(code);
+  }
+  return found;
 }
 
 // What two sticks can move in turn where these channels are owned: hand, base or both; of joints, four at a time.
@@ -84,7 +115,8 @@ function banks(owned, turns) {
   const arm = [...owned].filter((name) => name.startsWith("joint.") && !name.includes("base"));
   const fours = arm.flatMap((_, index) => (index % 4 ? [] : [arm.slice(index, index + 4).map((axis, each) => [each, axis, 1])]));
   const isHand = [...owned].some((name) => name.startsWith("ee.")), isBase = owned.has("base.vx") || owned.has(BY_JOINTS);
-  if (isHand) return [turns ? STICKS.turn : isBase ? STICKS.both : STICKS.hand, ...fours];
+  if (owned.has("two.vx")) return [turns ? STICKS.hands_turn : STICKS.hands, ...fours];
+  if (isHand) return [turns ? [...STICKS.turn, ...STICKS.apart] : isBase ? STICKS.both : STICKS.hand, ...fours];
   return [...fours, ...(isBase || !arm.length ? [STICKS.base] : [])];
 }
 
@@ -110,7 +142,19 @@ export function jointName(name) {
   return name.replace("joint.", "").replace(/_joint$/, "").replaceAll("_", " ");
 }
 
+// What moves along a channel, both ways; of several hands with the hand's name. Nothing for a joint.
+export function wordsOf(channel) {
+  const [part, way] = channel.split("."), words = part !== "joint" && AXES[`ee.${way}`];
+  return AXES[channel] ?? (words || undefined)?.map((each) => each.replace("hand", part === "pair" ? "both hands:" : `${part} hand`));
+}
+
+// The same in a word.
+export function shortName(channel) {
+  return SHORT[channel] ?? (wordsOf(channel) ? SHORT[`ee.${channel.split(".")[1]}`] : jointName(channel));
+}
+
 export function axisName(axis, sign) {
-  if (axis in AXES) return AXES[axis][sign > 0 ? 1 : 0];
+  const words = wordsOf(axis);
+  if (words) return words[sign > 0 ? 1 : 0];
   return `${jointName(axis)} ${sign > 0 ? "+" : "−"}`;
 }

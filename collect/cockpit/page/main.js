@@ -3,6 +3,7 @@ import { Decision } from "./decision.js";
 import { Episodes } from "./episodes.js";
 import { Gamepad } from "./gamepad.js";
 import { Help } from "./help.js";
+import { named, partsOf } from "./hands.js";
 import { Inputs } from "./inputs.js";
 import { Mapping } from "./mapping.js";
 import { BY_JOINTS, inForce, keyName } from "./keymap.js";
@@ -15,20 +16,21 @@ import { TouchSticks } from "./sticks.js";
 import { Study } from "./study.js";
 import { View } from "./view.js";
 import { wayOf } from "./way.js";
-import { XrHand } from "./xr.js";
+import { XrHands } from "./xr.js";
 import { foldPanels } from "./folds.js";
 
 const PERIOD = 25; // between two messages [ms]
 const byId = (id) => document.getElementById(id);
-const view = new View(byId("view"));
+const view = new View(byId("view"), (hand) => ask("hand", hand));
 let stage = null, frame = null, told = null, drawn = null;
 
 const ask = (what, value) => { episodes.cancel(); link.ask(what, value); };
 const DO = {
   start: () => { decision.close(); return frame?.phase === "driving" ? ask("pause") : episodes.start(frame?.phase); },
-  stop: () => ask("stop"), grip: () => { inputs.grip = !inputs.grip; }, pause: () => ask("pause"), success: () => decision.success(),
+  stop: () => ask("stop"), grip: () => inputs.flipGrip(frame?.hand ?? 0), pause: () => ask("pause"), success: () => decision.success(),
   failure: () => decision.failure(), restart: () => ask("restart"), discard: () => ask("discard"), undo: () => ask("undo"),
   quit: () => decision.quit(), help: () => help.toggle(), back: () => help.cancel() || decision.close() || help.close() || view.playback.close(),
+  hand: () => otherHand(), grip_left: () => inputs.flipGrip(0), grip_right: () => inputs.flipGrip(1),
   focus: () => otherFocus(), slower: () => faster(-0.2), faster: () => faster(0.2), mode: () => next("mode"), frame: () => next("frame"),
   joint: () => masks.nextJoint(), camera: () => view.nextCamera(),
 };
@@ -50,7 +52,8 @@ const link = new Link({
   stage: async (said) => {
     stage = said;
     inputs.mapping = new Mapping(stage);
-    for (const each of [panels, masks, sliders, episodes, study, decision]) each.stage(stage);
+    if (inputs.grips.length !== stage.hands.length) inputs.grips = stage.hands.map(() => false);
+    for (const each of [panels, masks, sliders, episodes, study, decision, xr]) each.stage(stage);
     hint();
     label();
     await view.stage(stage);
@@ -62,7 +65,7 @@ const masks = new Masks(link);
 const episodes = new Episodes(link);
 const help = new Help(inputs, gamepad, label);
 const study = new Study(link, (owned) => inForce(inputs.entries, owned));
-const xr = new XrHand(byId("xr"), inputs, (what, value) => link.ask(what, value), (words) => notices.say(words));
+const xr = new XrHands(byId("xr"), inputs, (what, value) => link.ask(what, value), (words) => notices.say(words));
 inputs.sources.push(gamepad, touch, sliders, xr);
 foldPanels();
 
@@ -76,6 +79,10 @@ function otherFocus() {
   return true;
 }
 
+function otherHand() {
+  if (frame && stage?.hands.length > 1) ask("hand", stage.hands[(frame.hand + 1) % stage.hands.length].name);
+}
+
 // The next one that there is to choose.
 function next(id) {
   const values = [...byId(id).options].filter((option) => !option.hidden).map((option) => option.value);
@@ -87,12 +94,12 @@ function hint() {
 }
 
 function way() {
-  return wayOf(frame, view.azimuth, stage.base);
+  return wayOf(frame, view.azimuth, stage);
 }
 
 // Each button says its key, as it is now.
 function label() {
-  for (const key of document.querySelectorAll("[data-key]")) key.textContent = keyName(inputs.mapping.actions[key.dataset.key]);
+  for (const key of document.querySelectorAll("[data-key]")) key.textContent = keyName(inputs.mapping.actions[key.dataset.key] ?? "");
 }
 
 for (const name of ["start", "pause", "undo", "success", "failure", "restart", "discard", "quit", "stop"]) byId(name).addEventListener("click", () => act(name));
@@ -105,21 +112,28 @@ function ownedBodies() {
   const has = (prefix) => [...inputs.owned].some((name) => name.startsWith(prefix));
   const bodies = stage.shapes.bodies, lit = new Set();
   if (has("base")) lit.add("planar_base"); // by its twist or its joints
-  if (has("ee.")) for (const name of bodies) if (name === "gripper" || name.startsWith("finger")) lit.add(name);
+  for (const { name: hand } of stage.hands) {
+    const prefix = hand && `${hand}.`;
+    if (!has(`${hand || "ee"}.`) && !(hand && has("pair."))) continue;
+    for (const name of bodies) if (name === `${prefix}gripper` || name.startsWith(`${prefix}finger`)) lit.add(name);
+  }
   for (const name of inputs.owned) if (name.startsWith("joint.")) lit.add(`${name.slice(6)}_body`);
   return lit;
 }
 
 // The channels that the operator owns; and, where they own all joints of the base, that its keys and sticks mean these.
 function owned() {
-  const names = new Set(frame.mask.map((index) => stage.channels[index]));
+  const names = new Set(named(frame.mask.map((index) => stage.channels[index]), inputs.parts));
   const base = stage.joints.slice(0, stage.base).map((name) => `joint.${name}`);
   return base.length && !names.has("base.vx") && base.every((name) => names.has(name)) ? names.add(BY_JOINTS) : names;
 }
 
-function own(owned) {
-  if ([...owned].join() === [...inputs.owned].join()) return;
-  inputs.owned = owned;
+function own() {
+  const { ee } = inputs.parts;
+  inputs.parts = partsOf(frame.mask.map((index) => stage.channels[index]), stage.hands.map(({ name }) => name), frame.hand);
+  const names = owned();
+  if (ee === inputs.parts.ee && [...names].join() === [...inputs.owned].join()) return;
+  inputs.owned = names;
   inputs.bank = 0;
   inputs.turns = false;
   view.light_up(ownedBodies());
@@ -139,7 +153,7 @@ function step() {
 // Says how it stands, also while a slow machine draws less often.
 function tell() {
   told = frame;
-  own(owned());
+  own();
   for (const each of [masks, panels, episodes, decision, xr]) each.frame(frame);
   panels.way(way());
   sliders.frame(frame, inputs.owned);

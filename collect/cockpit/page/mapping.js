@@ -1,20 +1,21 @@
 // Which key, button and stick does what: as it came, or as a person has changed it; kept for each robot.
-import { ACTIONS, HELD, defaultKeys, inForce } from "./keymap.js";
+import { actionsOf, defaultKeys, heldOf, inForce } from "./keymap.js";
 import { forget, keep, recall } from "./store.js";
 
 export const STOP = "Space"; // is always the stop, whatever else changes
 export const BACK = "Escape"; // always closes or cancels, and does nothing else
 export const STICK_AXES = ["left stick, sideways", "left stick, up and down", "right stick, sideways", "right stick, up and down"];
-const BUTTONS = Object.fromEntries(Object.entries({ ...ACTIONS, ...HELD }).map(([name, { button }]) => [name, button]));
 // Where a browser does not know a gamepad, it numbers sticks and buttons as the driver does.
 const OTHER_STICKS = [[0, 1], [1, 1], [3, 1], [4, 1]];
 const STANDARD_STICKS = [[0, 1], [1, 1], [2, 1], [3, 1]];
 
+const each = (table, what) => Object.fromEntries(Object.entries(table).map(([name, entry]) => [name, entry[what]]));
+
 function defaults(stage) {
   return {
     keys: defaultKeys(stage),
-    actions: Object.fromEntries(Object.entries(ACTIONS).map(([name, { key }]) => [name, key])),
-    buttons: { ...BUTTONS },
+    actions: each(actionsOf(stage), "key"),
+    buttons: each({ ...actionsOf(stage), ...heldOf(stage) }, "button"),
     sticks: null, // as the gamepad has them
   };
 }
@@ -43,6 +44,7 @@ function isFine(kept, first) {
 export class Mapping {
   constructor(stage) {
     this.name = `map:${stage.robot}`;
+    Object.assign(this, { offered: actionsOf(stage), held: heldOf(stage) });
     this.first = defaults(stage);
     Object.assign(this, renewed(recall(this.name, (kept) => isFine(renewed(kept, this.first), this.first), this.first), this.first));
   }

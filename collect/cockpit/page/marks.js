@@ -50,37 +50,43 @@ export class Marks {
     this.scene = scene;
     this.label = label;
     this.scale = 1; // of the robot's world; lengths here are those at scale 1
-    this.path = tube(scene, PLAN, 0.006);
     this.track = tube(scene, PLAN, 0.012);
-    this.asked = line(scene, ASKED, 0.03);
     this.near = line(scene, NEAR, 0.008);
     this.outline = line(scene, ASKED, 0.06);
     this.ends = [0, 1].map(() => new THREE.Mesh(
       new THREE.SphereGeometry(0.012, 12, 8), new THREE.MeshBasicMaterial({ color: NEAR, depthTest: false, transparent: true }),
     ));
     for (const end of this.ends) end.renderOrder = 4;
-    this.ghost = new THREE.Group();
-    scene.add(this.ghost, ...this.ends);
+    this.hands = []; // of each: its plan, the way that is asked for, its ghost and the bodies that it copies
+    scene.add(...this.ends);
   }
 
-  // The ghost of the hand looks like the hand.
+  // The ghost of a hand looks like the hand.
   stage(stage, bodies) {
-    this.bodies = bodies;
-    this.hand = stage.hand;
     this.baseSize = stage.base_size;
+    while (this.hands.length < stage.hands.length) this.hands.push(this.hand());
     this.setScale(stage.scale);
-    this.ghost.clear();
-    for (const index of stage.hand) {
-      const copy = new THREE.Group();
-      for (const part of bodies[index].children) copy.add(...this.hollow(part));
-      this.ghost.add(copy);
-    }
+    this.hands.forEach((hand, index) => {
+      hand.bodies = stage.hands[index].bodies;
+      hand.ghost.clear();
+      for (const body of hand.bodies) {
+        const copy = new THREE.Group();
+        for (const part of bodies[body].children) copy.add(...this.hollow(part));
+        hand.ghost.add(copy);
+      }
+    });
+  }
+
+  hand() {
+    const made = { path: tube(this.scene, PLAN, 0.006 * this.scale), asked: line(this.scene, ASKED, 0.03 * this.scale), ghost: new THREE.Group() };
+    this.scene.add(made.ghost);
+    return made;
   }
 
   // Lines of a small robot are drawn finer.
   setScale(scale) {
-    for (const each of [this.path, this.track]) each.radius *= scale / this.scale;
-    for (const { material } of [this.asked, this.near, this.outline]) {
+    for (const each of [this.track, ...this.hands.map(({ path }) => path)]) each.radius *= scale / this.scale;
+    for (const { material } of [this.near, this.outline, ...this.hands.map(({ asked }) => asked)]) {
       material.dashSize *= scale / this.scale;
       material.gapSize *= scale / this.scale;
     }
@@ -101,9 +107,11 @@ export class Marks {
   }
 
   frame(frame) {
-    drawTube(this.path, frame.path.map((point) => new THREE.Vector3(...point)), this.scale);
+    this.hands.forEach((hand, index) => {
+      drawTube(hand.path, (frame.paths[index] ?? []).map((point) => new THREE.Vector3(...point)), this.scale);
+      this.lead(hand, frame.tools[index], frame.ghosts[index] ?? [], frame.poses);
+    });
     drawTube(this.track, frame.track.map(([x, y]) => new THREE.Vector3(x, y, ON_FLOOR)), this.scale);
-    this.leadHand(frame);
     this.leadBase(frame);
     const points = frame.nearest?.points ?? [];
     const ends = points.length ? [new THREE.Vector3(...points.slice(0, 3)), new THREE.Vector3(...points.slice(3))] : [];
@@ -112,19 +120,17 @@ export class Marks {
     this.said = frame.nearest ? `${centimetres(frame.nearest.distance)} cm` : "";
   }
 
-  // Every part of the hand stands to the ghost as it stands to the hand now.
-  leadHand(frame) {
-    this.ghost.visible = frame.ghost.length > 0;
-    draw(this.asked, this.ghost.visible ? [frame.tool, frame.ghost].map((pose) => new THREE.Vector3(...pose.slice(0, 3))) : []);
-    if (!this.ghost.visible) return;
-    const now = new THREE.Group(), ahead = new THREE.Group();
-    place(now, frame.tool);
-    place(ahead, frame.ghost);
+  // Every part of a hand stands to its ghost as it stands to the hand now.
+  lead({ asked, ghost, bodies }, tool, wanted, poses) {
+    ghost.visible = wanted.length > 0;
+    draw(asked, ghost.visible ? [tool, wanted].map((pose) => new THREE.Vector3(...pose.slice(0, 3))) : []);
+    if (!ghost.visible) return;
+    const [now, ahead] = [tool, wanted].map((pose) => place(new THREE.Group(), pose));
     for (const each of [now, ahead]) each.updateMatrix();
     const moved = ahead.matrix.multiply(now.matrix.invert());
-    this.hand.forEach((body, index) => {
-      const part = this.ghost.children[index];
-      place(part, frame.poses, 7 * body);
+    bodies.forEach((body, index) => {
+      const part = ghost.children[index];
+      place(part, poses, 7 * body);
       part.updateMatrix();
       moved.clone().multiply(part.matrix).decompose(part.position, part.quaternion, part.scale);
     });
@@ -154,13 +160,14 @@ export class Marks {
   // Shows everything there is to show, anywhere.
   rehearse() {
     const points = [new THREE.Vector3(), new THREE.Vector3(1, 0, 0)];
-    for (const each of [this.asked, this.near, this.outline]) draw(each, points);
-    for (const each of [this.path, this.track]) drawTube(each, points);
-    for (const each of [this.ghost, ...this.ends]) each.visible = true;
+    for (const each of [this.near, this.outline, ...this.hands.map(({ asked }) => asked)]) draw(each, points);
+    for (const each of [this.track, ...this.hands.map(({ path }) => path)]) drawTube(each, points);
+    for (const each of [...this.hands.map(({ ghost }) => ghost), ...this.ends]) each.visible = true;
   }
 
   hide() {
-    for (const each of [this.path, this.track, this.asked, this.near, this.outline, this.ghost, ...this.ends]) each.visible = false;
+    const ofHands = this.hands.flatMap(({ path, asked, ghost }) => [path, asked, ghost]);
+    for (const each of [this.track, this.near, this.outline, ...this.ends, ...ofHands]) each.visible = false;
     this.said = "";
   }
 }

@@ -1,7 +1,7 @@
 // Any mask: which parts the person owns, by group, joint or single channel; choosing a mode goes back.
-import { AXES, SHORT, jointName } from "./keymap.js";
+import { jointName, shortName, wordsOf } from "./keymap.js";
 
-const GROUPS = { base: "base.", hand: "ee.", joints: "joint." };
+const OF_PAIR = ["pair", "apart"];
 const byId = (id) => document.getElementById(id);
 
 function toggle(words, label, act) {
@@ -27,12 +27,13 @@ export class Masks {
   stage(stage) {
     this.channels = stage.channels;
     this.joints = stage.joints.map((name) => stage.channels.indexOf(`joint.${name}`));
-    this.groups = Object.entries(GROUPS).map(([name, prefix]) => ({
-      name, channels: stage.channels.flatMap((channel, index) => (channel.startsWith(prefix) ? [index] : [])),
+    const hands = stage.hands.map(({ name }) => [name || "hand", [name || "ee"]]), pair = hands.length > 1 ? [["pair", OF_PAIR]] : [];
+    this.groups = [["base", ["base"]], ...hands, ...pair, ["joints", ["joint"]]].map(([name, parts]) => ({
+      name, channels: stage.channels.flatMap((channel, index) => (parts.includes(channel.split(".")[0]) ? [index] : [])),
     })).filter(({ channels }) => channels.length);
     this.parts = this.groups.map(({ name, channels }) => toggle(`○ ${name}: robot`, `you own the ${name}`, () => this.flip(channels)));
     byId("owned").replaceChildren(...this.parts);
-    this.single = stage.channels.map((name, index) => toggle(SHORT[name] ?? jointName(name), AXES[name]?.join(", ") ?? jointName(name), () => this.flip([index])));
+    this.single = stage.channels.map((name, index) => toggle(shortName(name), wordsOf(name)?.join(", ") ?? jointName(name), () => this.flip([index])));
     byId("channels").replaceChildren(...this.groups.map(({ name, channels }) => {
       const group = document.createElement("div"), title = document.createElement("b");
       title.textContent = name;

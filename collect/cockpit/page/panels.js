@@ -43,6 +43,13 @@ export class Panels {
     const own = new Option("a mask of your own", "");
     own.hidden = true;
     byId("mode").replaceChildren(...stage.modes.map((mode) => new Option(mode.name, mode.name)), own);
+    this.hands = stage.hands.map(({ name }, index) => {
+      const made = button(name, () => this.link.ask("hand", name));
+      made.className = `hand-${index}`;
+      return made;
+    });
+    byId("hand").hidden = stage.hands.length < 2;
+    byId("hands").replaceChildren(...this.hands);
     this.locks(stage);
     this.pictures(stage.cameras);
   }
@@ -122,7 +129,7 @@ export class Panels {
     byId("practice").disabled = !isDriver || frame.phase !== "ready";
     for (const id of NEEDS.begun) byId(id).disabled = !isDriver || frame.phase === "ready";
     for (const id of [...NEEDS.driver, ...NEEDS.choices]) byId(id).disabled = !isDriver;
-    for (const each of document.querySelectorAll("#owned button, #channels button, #locks input, [data-focus]")) each.disabled = !isDriver;
+    for (const each of document.querySelectorAll("#owned button, #channels button, #locks input, #hands button, [data-focus]")) each.disabled = !isDriver;
     byId("stop").disabled = Boolean(over); // without a connection, too: it is said when there is one
   }
 
@@ -139,6 +146,7 @@ export class Panels {
     if (document.activeElement !== byId("mode")) byId("mode").value = mode ? frame.mode : "";
     set("mode-help", mode?.help ?? "Your own mask: you steer what is lit, the robot the rest. Choose a mode to go back.");
     byId("focus").hidden = !frame.focus;
+    this.hands.forEach((each, index) => each.setAttribute("aria-pressed", String(index === frame.hand)));
     for (const each of document.querySelectorAll("[data-focus]")) each.setAttribute("aria-pressed", String(each.dataset.focus === frame.focus));
     if (document.activeElement !== byId("frame")) byId("frame").value = frame.frame;
     if (document.activeElement !== byId("speed")) byId("speed").value = frame.speed;
@@ -166,10 +174,13 @@ export class Panels {
   numbers(frame) {
     const said = (numbers) => numbers.map((x) => x.toFixed(3)).join(" ");
     const things = this.stageNow.shapes.bodies.map((name, index) => [name, frame.poses.slice(7 * index, 7 * index + 3)])
-      .filter(([name], index) => index > 0 && !name.endsWith("_body") && name !== "gripper")
+      .filter(([name], index) => index > 0 && !name.endsWith("_body") && !name.endsWith("gripper"))
       .map(([name, at]) => `${name} ${said(at)}`);
     const input = `input ${Math.round(1000 * frame.age)} ms old, there and back ${Math.round(1000 * frame.round_trip)} ms`;
     const counts = Object.entries(frame.dropped ?? {}).map(([why, count]) => `dropped: ${count} ${why}`);
-    return [`hand ${said(frame.tool.slice(0, 3))}`, `gripper ${Math.round(100 * frame.opening)} % open`, ...things, input, ...counts];
+    const hands = this.stageNow.hands.flatMap(({ name }, index) => [
+      `${name || "hand"} ${said(frame.tools[index].slice(0, 3))}`, `${name} gripper ${Math.round(100 * frame.openings[index])} % open`.trim(),
+    ]);
+    return [...hands, ...things, input, ...counts];
   }
 }

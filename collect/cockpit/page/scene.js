@@ -32,6 +32,7 @@ function meshGeometries(table, buffer) {
 export function place(object, numbers, start = 0) {
   object.position.set(numbers[start], numbers[start + 1], numbers[start + 2]);
   object.quaternion.set(numbers[start + 4], numbers[start + 5], numbers[start + 6], numbers[start + 3]);
+  return object;
 }
 
 function look(shape) {

@@ -1,6 +1,6 @@
 // Two sticks for thumbs, or the mouse: where a finger is on them, they are. Each finger has its own.
 import { shaped } from "./inputs.js";
-import { SHORT, jointName } from "./keymap.js";
+import { shortName } from "./keymap.js";
 
 const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
 
@@ -62,10 +62,11 @@ export class TouchSticks {
   label() {
     const sticks = this.inputs.sticks();
     const said = (from) => sticks.filter(([index]) => index === from || index === from + 1)
-      .map(([, axis]) => SHORT[axis] ?? jointName(axis)).join(" · ");
+      .map(([, axis]) => shortName(axis)).join(" · ");
     this.knobs.forEach((stick, index) => {
       const part = sticks.find(([each]) => each >> 1 === index)?.[1] ?? "";
-      const words = `${part.startsWith("base") ? "base" : part.startsWith("ee") ? "hand" : "joints"}: ${said(2 * index)}`;
+      const [what] = this.inputs.channelOf(part).split(".");
+      const words = `${{ joint: "joints", ee: "hand", pair: "both hands", "": "joints" }[what] ?? what}: ${said(2 * index)}`;
       const label = stick.querySelector("span");
       if (label.textContent !== words) label.textContent = words;
     });

@@ -2,6 +2,7 @@
 import { THREE } from "./three.min.js";
 import { AimMarks } from "./aim.js";
 import { Cameras } from "./cameras.js";
+import { Hands } from "./hands.js";
 import { Marks } from "./marks.js";
 import { Playback } from "./playback.js";
 import { Ground, forgetBodies, makeBodies, place } from "./scene.js";
@@ -19,8 +20,10 @@ function drawsInSoftware() {
 }
 
 export class View {
-  constructor(canvas) {
+  // choose(name): the person has chosen a hand
+  constructor(canvas, choose) {
     this.canvas = canvas;
+    this.hands = new Hands(canvas, choose);
     const isSoftware = drawsInSoftware();
     this.tools = build(canvas, (camera) => this.choose(camera));
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware, powerPreference: "high-performance" });
@@ -46,7 +49,9 @@ export class View {
     const bodies = await makeBodies(stage.shapes, stage.meshes);
     forgetBodies(this.scene, this.bodies);
     this.bodies = bodies;
+    this.channels = stage.channels;
     this.marks.stage(stage, bodies);
+    this.hands.stage(stage, bodies);
     this.aimMarks.scale = stage.scale;
     this.cameras.stage(stage);
     this.light_up(this.owned);
@@ -68,6 +73,7 @@ export class View {
 
   hideMarks() {
     this.marks.hide();
+    this.hands.isShown = false;
     this.aimMarks.show(false);
     this.stale = true;
   }
@@ -90,9 +96,10 @@ export class View {
     this.pose(this.bodies, frame.poses, 0);
     this.marks.frame(frame);
     this.aimMarks.frame(frame);
-    const tool = new THREE.Group();
-    place(tool, frame.tool);
-    this.look(this.bodies, tool, frame.aim && new THREE.Vector3(...frame.aim.pose));
+    this.hands.isShown = true;
+    this.hands.frame(frame, this.channels);
+    const tools = frame.tools.map((pose) => place(new THREE.Group(), pose));
+    this.look(this.bodies, tools[frame.hand], tools, frame.aim && new THREE.Vector3(...frame.aim.pose));
   }
 
   pose(bodies, numbers, start) {
@@ -100,8 +107,9 @@ export class View {
     this.stale = true;
   }
 
-  look(bodies, tool, aim) {
-    this.cameras.frame(bodies[1], tool, aim);
+  // tool: of the active hand; tools: all of them
+  look(bodies, tool, tools, aim) {
+    this.cameras.frame(bodies[1], tool, tools, aim);
     this.ground.follow(bodies[1].position.clone().setZ(0));
   }
 
@@ -116,7 +124,8 @@ export class View {
 
   playRow(numbers, start) {
     this.pose(this.played, numbers, start);
-    this.look(this.played, this.played[this.played.findIndex(({ name }) => name === "gripper")] ?? this.played.at(-1));
+    const hand = this.played.find(({ name }) => name.endsWith("gripper")) ?? this.played.at(-1);
+    this.look(this.played, hand, [hand]);
   }
 
   choose(camera) {
@@ -149,6 +158,7 @@ export class View {
     this.stale = false;
     const began = performance.now();
     this.renderer.render(this.scene, this.cameras.camera);
+    this.hands.letter(this.cameras.camera);
     this.marks.letter(this.cameras.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     this.adapt(performance.now() - began);
   }

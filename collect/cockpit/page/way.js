@@ -9,10 +9,10 @@ const about = (angle) => [Math.cos(angle / 2), 0, 0, Math.sin(angle / 2)]; // th
 const turned = (q, v) => times(times(q, [0, ...v]), inverse(q)).slice(1);
 
 // How the axes stand in the world that the hand's keys mean: q takes them there.
-function axesOf({ frame, q, tool }, azimuth, base) {
+function axesOf({ frame, q, tools, hand }, azimuth, base) {
   if (frame === "view") return about(azimuth);
   if (frame === "base") return about(base ? q[2] : 0);
-  return frame === "tool" ? tool.slice(3) : [1, 0, 0, 0];
+  return frame === "tool" ? tools[hand].slice(3) : [1, 0, 0, 0];
 }
 
 export function centimetres(metres) {
@@ -31,12 +31,13 @@ function said(whole, left, isEnough) {
 }
 
 // base: how many joints of the robot are its base's; azimuth: from where the person looks [rad]
-export function wayOf(frame, azimuth, base) {
-  const { aim, tool } = frame;
+export function wayOf(frame, azimuth, { base, hands }) {
+  const { aim } = frame;
   if (!aim) return "";
+  const tool = frame.tools[aim.hand], whose = hands.length > 1 ? ` of the ${hands[aim.hand].name} hand` : "";
   const axes = inverse(axesOf(frame, azimuth, base));
   const way = turned(axes, aim.pose.slice(0, 3).map((x, index) => x - tool[index])), distance = Math.hypot(...way);
-  const words = `${aim.name}: ${said(`${centimetres(distance)} cm away`, parts(MOVES, way, centimetres), distance <= aim.distance)}`;
+  const words = `${aim.name}${whose}: ${said(`${centimetres(distance)} cm away`, parts(MOVES, way, centimetres), distance <= aim.distance)}`;
   if (aim.pose.length < 4) return words;
   const turn = turned(axes, turnTo(tool.slice(3), aim.pose.slice(3))), angle = Math.hypot(...turn);
   const degrees = (x) => (DEGREES * x).toFixed(0);

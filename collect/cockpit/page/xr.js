@@ -1,4 +1,5 @@
-// A phone or headset that knows its pose (WebXR): while it is held, the hand moves as the device has moved since the press.
+// Phones and controllers that know their pose (WebXR): while one is held, a hand moves as it has moved since the press. Of a robot
+// with several hands each controller has one: its grip button is held, its trigger closes and opens the gripper.
 // The device says right, up, back; the scene forward, left, up: who begins looks where the scene's x leads.
 import { inverse, times, turnTo } from "./turn.js";
 
@@ -6,10 +7,18 @@ const GAIN = 8; // deflection for a metre between the hand and where it shall be
 const TURN_GAIN = 2.5; // the same for a radian
 const DEAD = 0.02; // of a full deflection: 2.5 mm
 const MODES = ["immersive-ar", "immersive-vr"];
-const AXES = ["ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz"];
+const AXES = ["vx", "vy", "vz", "wx", "wy", "wz"];
+const SIDES = ["left", "right"];
 
 const inScene = ({ x, y, z }) => [-z, -x, y];
 const turnInScene = (q) => [q.w, ...inScene(q)];
+
+// Where a pose is in the scene; nothing where that is not known.
+function placed(pose) {
+  if (!pose || pose.emulatedPosition) return null;
+  const at = inScene(pose.transform.position), turned = turnInScene(pose.transform.orientation);
+  return [...at, ...turned].every(Number.isFinite) ? { at, turned } : null;
+}
 
 // The first kind of session that the browser has, or none.
 async function supported() {
@@ -17,10 +26,10 @@ async function supported() {
   return null;
 }
 
-export class XrHand {
+export class XrHands {
   // ask(what, value): of the robot; say(words): to the person
   constructor(button, inputs, ask, say) {
-    Object.assign(this, { button, inputs, ask, say, device: "xr", session: null, source: null, start: null, now: null, hand: null });
+    Object.assign(this, { button, inputs, ask, say, device: "xr", session: null, leads: new Map(), names: [], hands: [] });
     supported().then((mode) => {
       this.mode = mode;
       button.hidden = !mode;
@@ -32,8 +41,10 @@ export class XrHand {
     if (this.session) return this.session.end();
     const session = await navigator.xr.requestSession(this.mode, { optionalFeatures: ["dom-overlay"], domOverlay: { root: document.body } });
     session.addEventListener("end", () => this.ended());
-    session.addEventListener("selectstart", (event) => { this.letGo(); this.source = event.inputSource; });
-    session.addEventListener("selectend", (event) => { if (event.inputSource === this.source) this.letGo(); });
+    for (const kind of ["select", "squeeze"]) {
+      session.addEventListener(`${kind}start`, ({ inputSource }) => this.press(kind, inputSource));
+      session.addEventListener(`${kind}end`, ({ inputSource }) => { if (kind === this.clutch(inputSource)) this.drop(inputSource); });
+    }
     session.addEventListener("visibilitychange", () => { if (session.visibilityState !== "visible") this.letGo(); });
     const context = document.createElement("canvas").getContext("webgl", { xrCompatible: true });
     await session.updateRenderState({ baseLayer: new XRWebGLLayer(session, context) });
@@ -51,39 +62,74 @@ export class XrHand {
     this.button.setAttribute("aria-pressed", "false");
   }
 
-  letGo() {
-    this.source = this.start = this.now = null;
+  stage({ hands }) {
+    this.names = hands.map(({ name }) => name);
+    this.letGo();
   }
 
-  // Where the device is in this frame of the session; what is not tracked has let go.
+  // What is held to lead a hand.
+  clutch({ targetRayMode }) {
+    return this.names.length > 1 && targetRayMode === "tracked-pointer" ? "squeeze" : "select";
+  }
+
+  // Whose hand a source leads, by number: that of its name or side; of a phone the active one.
+  handOf({ handedness }) {
+    if (this.names.length < 2 || !SIDES.includes(handedness)) return this.active ?? 0;
+    return this.names.includes(handedness) ? this.names.indexOf(handedness) : SIDES.indexOf(handedness);
+  }
+
+  press(kind, source) {
+    const hand = this.handOf(source);
+    if (kind !== this.clutch(source)) {
+      if (kind === "select") this.inputs.flipGrip(hand);
+      return;
+    }
+    this.drop(source);
+    this.leads.set(hand, { source, start: null, now: null }); // of two sources with one hand, the newest
+    if (this.names.length > 1 && !this.inputs.owned.has(`${this.names[hand]}.vx`)) this.ask("hand", this.names[hand]);
+  }
+
+  drop(source) {
+    for (const [hand, lead] of this.leads) if (lead.source === source) this.leads.delete(hand);
+  }
+
+  letGo() {
+    this.leads.clear();
+  }
+
+  // Where the sources are in this frame of the session; where one is not tracked, all have let go.
   step(frame) {
     if (!this.session) return;
     this.session.requestAnimationFrame((_, next) => this.step(next));
-    if (!this.source) return;
-    const space = this.source.gripSpace;
-    const pose = space ? frame.getPose(space, this.space) : frame.getViewerPose(this.space);
-    if (!pose || pose.emulatedPosition || !this.hand) {
-      if (this.start) this.say("The device has lost its place: let go, and press again.");
-      this.letGo();
-      return;
+    for (const [hand, lead] of this.leads) {
+      const space = lead.source.gripSpace;
+      lead.now = placed(space ? frame.getPose(space, this.space) : frame.getViewerPose(this.space));
+      if (!lead.now || !this.hands[hand]) {
+        if (lead.start) this.say("The device has lost its place: let go, and press again.");
+        this.letGo();
+        return;
+      }
+      lead.start ??= { ...lead.now, hand: this.hands[hand] };
     }
-    this.now = { at: inScene(pose.transform.position), turned: turnInScene(pose.transform.orientation) };
-    this.start ??= { ...this.now, hand: this.hand };
   }
 
-  // Take where the hand is.
+  // Take where the hands are.
   frame(frame) {
-    this.hand = { at: frame.tool.slice(0, 3), turned: frame.tool.slice(3) };
+    this.hands = frame.tools.map((tool) => ({ at: tool.slice(0, 3), turned: tool.slice(3) }));
+    this.active = frame.hand;
     this.isWorld = frame.frame === "world";
   }
 
-  // Deflections towards where the hand shall be, [[axis, value], …].
+  // Deflections towards where the hands shall be, [[axis, value], …]; a pair is led by the one that was pressed first.
   moves() {
-    if (!this.start || !this.isWorld) return [];
-    const { start, now, hand } = this;
+    const isPair = this.inputs.parts.ee === "pair", leads = [...this.leads].filter(([, { start }]) => start && this.isWorld);
+    return (isPair ? leads.slice(0, 1) : leads).flatMap(([number, lead]) => this.led(lead, this.hands[number], isPair ? "ee" : this.names[number] || "ee"));
+  }
+
+  led({ start, now }, hand, part) {
     const way = now.at.map((x, index) => start.hand.at[index] + x - start.at[index] - hand.at[index]);
     const wanted = times(times(now.turned, inverse(start.turned)), start.hand.turned);
     const twist = [...way.map((x) => GAIN * x), ...turnTo(hand.turned, wanted).map((x) => TURN_GAIN * x)];
-    return AXES.map((axis, index) => [axis, Math.max(-1, Math.min(1, twist[index]))]).filter(([axis, value]) => Math.abs(value) > DEAD && this.inputs.owned.has(axis));
+    return AXES.map((axis, index) => [`${part}.${axis}`, Math.max(-1, Math.min(1, twist[index]))]).filter(([axis, value]) => Math.abs(value) > DEAD && this.inputs.owned.has(axis));
   }
 }

@@ -17,7 +17,7 @@ class Input:
 
     on: bool  # whether somebody holds the dead-man, and is there: a page seen, a device connected
     device: str  # what is moved
-    grip: bool  # whether the gripper shall be closed
+    grips: Annotated[tuple[bool, ...], Meta(max_length=MOST)]  # which grippers shall be closed, one a hand
     axes: Annotated[tuple[_Deflection, ...], Meta(max_length=MOST)]  # deflection of each channel, (m,)
     view: Annotated[float, Meta(ge=-10, le=10)]  # from where the person looks, about the vertical [rad]
     targets: Annotated[tuple[_Angle, ...], Meta(max_length=MOST)]
@@ -47,6 +47,7 @@ ASKS: Mapping[str, type] = {
     "mode": str,
     "mask": list,  # of channels that the operator wants to own, whatever the mode says
     "focus": str,
+    "hand": str,  # the one of several that is steered now
     "frame": str,
     "speed": float,
     "lock": list,

@@ -5,12 +5,11 @@ from typing import Literal
 
 import numpy as np
 
-from handrail.collect.operators.modes import Focus, TeleopMode
+from handrail.collect.operators.modes import MASK, Focus, TeleopMode
 from handrail.collect.operators.person.inputs import Input
 from handrail.collect.operators.scripted.input_map import StickMap
 from handrail.collect.operators.scripted.steering import FOLLOW, Gains
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
@@ -28,11 +27,12 @@ class Setting:
 
     mode: TeleopMode  # teleop mode
     focus: Focus = "hand"  # what they attend to, in a mode that makes a difference
+    hand: str = ""  # the active one of several: which one a mode of one hand owns
     frame: HandFrame = "view"  # in which the hand's deflections are meant; `view` is as the person looks
     speed: float = 0.6  # share of full stick
     locked: tuple[int, ...] = ()  # joints that shall stand still, by index
     axis: int = -1  # the one that is steered, in a mode of one axis at a time; −1 before the first
-    switches: int = 0  # how often mode, focus, locks or that axis have changed in this episode
+    switches: int = 0  # how often mode, focus, hand, locks or that axis have changed in this episode
 
     @property
     def is_single(self) -> bool:
@@ -50,13 +50,19 @@ class InputMeaning:
     Args:
         model: of the robot.
         mode: any of the modes.
+
+    Attributes:
+        channels: of the robot.
+        hands: names of its hands.
     """
 
     def __init__(self, model: RobotModel, mode: TeleopMode) -> None:
-        if len(model.description.hands) > 1:
-            words = "expected a robot with one hand where a person steers; scripts steer robots with several"
-            raise HandrailError(f"robot {model.description.name}: {words}")
         self.channels = Channels.of(model.description)
+        self.hands = tuple(hand.name for hand in model.description.hands)
+        pair, count = self.channels.pair_slice.start, len(self.hands)
+        self._twists = [self.channels.hand_slice(hand) for hand in range(count)]
+        self._twists += [slice(pair, pair + 6)] if self.channels.pair else []
+        self._apart = slice(pair + 6, self.channels.pair_slice.stop)
         self._base = len(self.channels.base)
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
         self._full = StickMap(model, mode, Gains().within(model.description.world)).full
@@ -64,20 +70,40 @@ class InputMeaning:
     def fits(self, inputs: Input) -> bool:
         """Whether inputs are those of this robot."""
         arm = len(self.channels.joints) - self._base
-        return len(inputs.axes) == self.channels.size and len(inputs.targets) in (0, arm)
+        of_hands = len(inputs.grips) == len(self.hands)
+        return len(inputs.axes) == self.channels.size and of_hands and len(inputs.targets) in (0, arm)
 
     def mask(self, setting: Setting) -> BoolArray:
-        """Return the channels that the operator owns, (m,)."""
-        mask = self.channels.mask(*setting.mode.owned(setting.focus))
+        """Return the channels that the operator owns, (m,); of a pair also how fast it parts."""
+        mask = self.channels.mask(*setting.mode.owned(setting.focus, setting.hand))
+        mask[self._apart] |= self._is_pair(mask) and not setting.mode.name.startswith(MASK)
         mask[[self.channels.joint_slice.start + joint for joint in setting.locked]] = True
         return mask
+
+    def _is_pair(self, mask: BoolArray) -> bool:
+        return bool(mask[self.channels.pair_slice][:6].any())
+
+    def parts(self, setting: Setting) -> dict[str, str]:
+        """Return the hand, or `pair`, that parts of a device's axes stand for; nothing where none is steered.
+
+        `ee` is what is steered: the active hand, the only one, or the pair; of two at once they are `one` and
+        `two`.
+        """
+        mask, channels, active = self.mask(setting), self.channels, self.hands.index(setting.hand)
+        names = [name or "ee" for name in self.hands]
+        own = [n for n in range(len(names)) if mask[channels.hand_slice(n)].any()]
+        if not own:
+            return {"ee": "pair"} if mask[channels.pair_slice].any() else {}
+        parts = {"ee": names[active if active in own else own[0]]}
+        return parts | dict(zip(("one", "two"), names, strict=False)) if len(own) > 1 else parts
 
     def intent(
         self, inputs: Input, setting: Setting, state: State, age: float = 0.0, round_trip: float = 0.0
     ) -> Intent:
         """Return what is asked for: on every channel of the mode, deflection × full stick × speed.
 
-        In a mode of one axis at a time only that of the setting counts, and the mask says which.
+        In a mode of one axis at a time only that of the setting counts, and the mask says which. How far a
+        pair is apart is asked for while it is moved, else kept.
         Targets of the arm's joints are followed within that, `q̇ = k (q_target − q)`. Deflections of the base
         count in every mode that has the base in it, also where that means its joints.
 
@@ -89,12 +115,14 @@ class InputMeaning:
             round_trip: of the frame that they answer [s].
         """
         mask, raw = self.mask(setting), np.array(inputs.axes)
+        mask[self._apart] &= not self._is_pair(mask) or raw[self._apart] != 0
         if setting.is_single:
             alone = np.arange(mask.size) == setting.axis
             mask, raw = mask & alone, np.where(alone, raw, 0.0)
         values = setting.speed * self._full * raw
-        tool, joints = self.channels.hand_slice(), self.channels.joint_slice
-        values[tool] = self._hand(values[tool], inputs, setting, state)
+        joints = self.channels.joint_slice
+        for twist in self._twists:
+            values[twist] = self._hand(values[twist], inputs, setting, state)
         if self._base and mask[joints][: self._base].all() and not mask[self.channels.base_slice].any():
             values[joints.start : joints.start + self._base] += turned(
                 values[self.channels.base_slice], state.q[2]
@@ -108,7 +136,7 @@ class InputMeaning:
         return Intent(
             np.where(mask, values, 0.0),
             mask,
-            grippers=(float(inputs.grip),),
+            grippers=tuple(map(float, inputs.grips)),
             mode=setting.mode.name,
             time=state.time,
             frames=Frames(tool="tool" if setting.frame == "tool" else "world"),
@@ -116,7 +144,7 @@ class InputMeaning:
         )
 
     def _hand(self, twist: FloatArray, inputs: Input, setting: Setting, state: State) -> FloatArray:
-        """Return the hand's twist in the world, or in the tool where it is meant there, (6,)."""
+        """Return a twist of a hand in the world, or in the tool where it is meant there, (6,)."""
         if setting.frame in ("world", "tool"):
             return twist
         angle = inputs.view if setting.frame == "view" else state.q[2] if self._base else 0.0

@@ -64,7 +64,7 @@ class Person:
     ) -> None:
         self.meaning = InputMeaning(model, modes[first])
         self.modes, self._clock = modes, clock
-        self.setting, self.phase = Setting(modes[first]), Phase.READY
+        self.setting, self.phase = Setting(modes[first], hand=model.hand.name), Phase.READY
         self.inputs: Input | None = None
         self.received = self.round_trip = 0.0
         self.practises = False
@@ -120,6 +120,8 @@ class Person:
                 self.setting = setting if mode.name == setting.mode.name else setting.switched(mode=mode)
             case "focus" if value in ("hand", "base") and value != setting.focus:
                 self.setting = setting.switched(focus=value)
+            case "hand" if value in self.meaning.hands and value != setting.hand:
+                self.setting = setting.switched(hand=value)
             case "frame" if value in HAND_FRAMES:
                 self.setting = replace(setting, frame=value)
             case "speed":

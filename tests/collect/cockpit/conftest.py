@@ -22,8 +22,8 @@ def on_bench(new_page):
 
     with ExitStack() as stack:
 
-        def opened(mode="ee", **options):
-            made = stack.enter_context(bench(mode))
+        def opened(mode="ee", robot="ridgeback_ur10", **options):
+            made = stack.enter_context(bench(mode, robot=robot))
             return made, PageDriver(new_page(**options), made.address)
 
         yield opened

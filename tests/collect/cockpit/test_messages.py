@@ -17,7 +17,7 @@ GOOD = {
     "echo": 1.5,
     "on": True,
     "device": "keyboard",
-    "grip": False,
+    "grips": [False],
     "axes": [0, 1.0],
 }
 GOOD |= {"view": 0.3, "targets": [3.0]}
@@ -40,7 +40,7 @@ def test_a_drive_and_an_ask():
     drive = parse(said())
     assert isinstance(drive, Drive)
     assert (drive.seq, drive.echo) == (3, 1.5)
-    assert (drive.on, drive.device, drive.grip, drive.axes) == (True, "keyboard", False, (0.0, 1.0))
+    assert (drive.on, drive.device, drive.grips, drive.axes) == (True, "keyboard", (False,), (0.0, 1.0))
     assert (drive.view, drive.targets) == (0.3, (3.0,))
     assert parse('{"kind": "ask", "what": "mode", "value": "ee"}') == Ask("mode", "ee")
     assert parse('{"kind": "ask", "what": "lock", "value": [1, 2]}') == Ask("lock", (1, 2))
@@ -56,7 +56,8 @@ def test_a_drive_and_an_ask():
         '{"kind": "ask", "what": "mode", "value": "' + "x" * 200 + '"}',
         said(axes=[float("nan")]), said(axes=[2.0]), said(axes=["1"]), said(axes=[True]), said(axes=[0] * 65),
         said(axes={}), said(seq=-1), said(seq=1.0), said(seq=True), said(seq=2**60), said(echo=-1),
-        said(on=1), said(device="mouse"), said(device=[]), said(view=1e9), said(grip=None), said(extra=1),
+        said(on=1), said(device="mouse"), said(device=[]), said(view=1e9), said(grips=None), said(grips=[0]),
+        said(grips=False), said(extra=1),
         said(targets=[100.0]), said(targets=None), said(device="\ud800"), said(echo=10**400),
         said(axes=[10**400]), said(view="\ud800"),
         answer(value=[]), answer(value={}), answer(value=float("nan")), answer(value=1e12),

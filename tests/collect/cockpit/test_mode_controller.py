@@ -1,5 +1,7 @@
 """Laws: a mode can change while the robot moves, and what is sent stays within the limits of acceleration."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -22,7 +24,8 @@ def env():
 def test_no_change_of_mode_jolts(env):
     model = env.model
     modes = build_modes(SessionConfig(task="reach", physics=False), env)
-    controller = ModeController(modes, lambda mode: build_controller(mode, model, 20, "reach"), modes["ee"])
+    build = partial(build_controller, fps=20, task="reach")
+    controller = ModeController(modes, build, modes["ee"], model)
     channels, limits = Channels.of(model.description), model.description.limits
     rng = np.random.default_rng(0)
     controller.reset(env.obstacles())

@@ -45,7 +45,7 @@ def test_the_picture_from_everywhere_the_intent_playback_and_the_end(new_page, f
         driver = PageDriver(page, address)
         cameras_can_be_chosen(driver)
         driver.begin()
-        what_is_asked_leads(driver, "KeyW", "f.ghost.length === 7")
+        what_is_asked_leads(driver, "KeyW", "f.ghosts[0]?.length === 7")
         driver.choose("mode", "base")
         what_is_asked_leads(driver, "KeyI", "f.ghost_base.length === 3")
         driver.done()
@@ -72,9 +72,9 @@ def cameras_can_be_chosen(driver):
 def what_is_asked_leads(driver, key, condition):
     def leads():
         driver.page.keyboard.down(key)
-        found = shown(driver, condition + " && f.path.length > 1 && f.track.length > 1", 4.0)
+        found = shown(driver, condition + " && f.paths[0]?.length > 1 && f.track.length > 1", 4.0)
         driver.page.keyboard.up(key)  # let go also where a busy computer has lost the input
-        return shown(driver, "!f.ghost.length && !f.ghost_base.length", 4.0) and found
+        return shown(driver, "!f.ghosts[0]?.length && !f.ghost_base.length", 4.0) and found
 
     assert driver.wait(leads, 60.0)
 

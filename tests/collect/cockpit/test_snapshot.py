@@ -9,7 +9,7 @@ import pytest
 
 from handrail.collect.cockpit.disk import DiskRoom
 from handrail.collect.cockpit.nearest import NearestPair
-from handrail.collect.cockpit.snapshot import AHEAD, STATUS, Snapshots, base_ahead, hand_ahead, reason
+from handrail.collect.cockpit.snapshot import AHEAD, STATUS, Snapshots, base_ahead, hands_ahead, reason
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
@@ -100,7 +100,7 @@ def ahead(env, intent, q=None):
     """Return the hand's pose and the base's to which an intent leads."""
     now = view(env)
     q = now.state.q if q is None else q
-    return hand_ahead(env.model, intent, now.tool, q), base_ahead(env.model, intent, q)
+    return *hands_ahead(env.model, intent, [now.tool], q), base_ahead(env.model, intent, q)
 
 
 def test_the_hand_leads_where_it_is_asked_to_go_and_turn(env):
@@ -160,8 +160,8 @@ def test_a_moment_is_small_and_finite(env, person):
     snapshots.see(frame(env))
     text = json.dumps(snapshots.now(view(env), person, 1.0), allow_nan=False)
     said = json.loads(text)
-    assert len(said["ghost"]) == 7
-    assert len(said["path"]) == len(said["track"]) > 5
+    assert [len(ghost) for ghost in said["ghosts"]] == [7]
+    assert len(said["paths"][0]) == len(said["track"]) > 5
     assert len(text) < 6000
 
 

@@ -58,7 +58,7 @@ def test_the_gamepad_means_what_it_means_in_the_browser():
     page = re.sub(r" *//.*", "", PAGE.read_text())
     table = re.sub(r"(\w+):", r'"\1":', re.search(r"STICKS = (\{.*?\});", page, re.DOTALL)[1])
     sticks = json.loads(table.replace(",\n}", "\n}"))
-    table = load_map("gamepad", gamepad.CONTROLS)
+    table, of_hands = (load_map("gamepad", gamepad.CONTROLS, hands=hands) for hands in (1, 2))
     for section, entries in sticks.items():
         ours = table.moves[section]
         assert {(gamepad.AXES[index], axis, sign) for index, axis, sign in entries} <= {
@@ -68,6 +68,8 @@ def test_the_gamepad_means_what_it_means_in_the_browser():
     up, down = (table.moves["both"][BROWSER[buttons[name]]] for name in ("up", "down"))
     assert (up, down) == (("ee.vz", 1), ("ee.vz", -1))
     known = {name: BROWSER[index] for name, index in buttons.items() if index in BROWSER}
+    several = {name: known.pop(name) for name in ("hand", "grip_left", "grip_right")}
+    assert {name: of_hands.actions[button] for name, button in several.items()} == {n: n for n in several}
     shared = {name: table.actions[button] for name, button in known.items() if name not in ("up", "down")}
     others = {"start": "start_or_pause", "deadman": "hold", "turn": "clutch"}
     assert shared == {name: others.get(name, name) for name in shared}
@@ -88,7 +90,10 @@ def test_a_persons_changes_win_and_an_empty_text_takes_away(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('[arm]\na = "ee.vx"', "unknown entry 'arm'; expected some of hand, turn, base, both, joints"),
+        (
+            '[arm]\na = "ee.vx"',
+            "unknown entry 'arm'; expected some of hand, turn, apart, hands, hands_turn, base",
+        ),
         ('[hand]\nlever = "ee.vx"', "[hand]: unknown entry 'lever'; expected some of a, b, back"),
         ('[hand]\na = "base.vx"', "[hand] a: expected one of ee.vx"),
         ('[actions]\na = "jump"', "[actions] a: expected one of hold, clutch"),

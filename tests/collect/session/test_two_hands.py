@@ -7,7 +7,6 @@ import pytest
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.operators.person.meaning import InputMeaning
 from handrail.collect.session.build import build_env, build_mode, build_modes, build_session, session_features
 from handrail.collect.world.observation import from_numbers, to_numbers
 from handrail.controllers.errors import HandrailError
@@ -94,9 +93,6 @@ def test_a_mode_of_two_hands_is_only_for_robots_that_have_them():
     assert steered == ("pair.vx", "pair.vy", "pair.vz", "pair.wz")
 
 
-def test_a_hand_that_is_not_there_and_a_person_are_refused_in_a_line():
+def test_a_hand_that_is_not_there_is_refused_in_a_line():
     with pytest.raises(HandrailError, match="unknown hand 'third': expected one of left, right"):
         build_env(SessionConfig(robot=ROBOT, hand="third"), 20)
-    env = build_env(SessionConfig(robot=ROBOT), 20)
-    with pytest.raises(HandrailError, match="expected a robot with one hand where a person steers"):
-        InputMeaning(env.model, MODES["ee"])

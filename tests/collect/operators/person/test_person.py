@@ -34,7 +34,7 @@ def view(time=0.0):
 def drive(operator, on=True, **axes):
     names = operator.meaning.channels.names
     values = tuple(float(axes.get(name.replace(".", "_"), 0.0)) for name in names)
-    operator.take(Input(on, "keyboard", False, values, 0.0, ()), CLOCK[0], 0.01)
+    operator.take(Input(on, "keyboard", (False,), values, 0.0, ()), CLOCK[0], 0.01)
 
 
 def begin(operator):
@@ -156,7 +156,7 @@ def test_the_base_is_driven_through_its_joints_where_these_are_owned(operator):
 
 def test_an_input_of_another_robot_is_not_taken(operator):
     begin(operator)
-    operator.take(Input(True, "keyboard", False, (1.0,) * 3, 0.0, ()), CLOCK[0])
+    operator.take(Input(True, "keyboard", (False,), (1.0,) * 3, 0.0, ()), CLOCK[0])
     assert not operator.act(view()).values.any()
 
 
@@ -167,7 +167,7 @@ def test_joints_go_to_their_targets_within_full_stick(operator):
     arm = np.array(now.state.q[3:])
     axes = (0.0,) * operator.meaning.channels.size
     targets = arm + np.array([0.01, 1.0, -1.0] + [0.0] * (len(arm) - 3))
-    operator.take(Input(True, "sliders", False, axes, 0.0, tuple(targets)), CLOCK[0])
+    operator.take(Input(True, "sliders", (False,), axes, 0.0, tuple(targets)), CLOCK[0])
     intent = operator.act(now)
     joints = intent.values[operator.meaning.channels.joint_slice][3:]
     assert joints[0] == pytest.approx(0.06)
@@ -180,7 +180,7 @@ def test_targets_count_only_after_they_were_let_go(operator):
     operator.ask(Ask("mode", "leader"))
     operator.ask(Ask("start", True))
     now = view()
-    held = Input(True, "sliders", False, (0.0,) * operator.meaning.channels.size, 0.0, (1.0,) * 6)
+    held = Input(True, "sliders", (False,), (0.0,) * operator.meaning.channels.size, 0.0, (1.0,) * 6)
     operator.take(held, CLOCK[0])
     assert not operator.act(now).values.any()
     operator.take(replace(held, targets=()), CLOCK[0])

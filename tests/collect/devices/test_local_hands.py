@@ -1,0 +1,110 @@
+"""Laws of a person at this computer who steers a robot with two hands: which control moves which hand."""
+
+import numpy as np
+import pytest
+from driven_person import CONTROLS, FORWARD, Driven
+from places import TIAGO
+
+from handrail.collect.devices.control_map import Steered, load_map
+from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.operators.person.inputs import Ask
+from handrail.controllers.robot.model import load_model
+
+MODEL = load_model(TIAGO)
+OTHER = {"gamepad": "a", "spacemouse": "button_2", "keyboard": "/"}
+GRIPS = {"gamepad": ("left_trigger", "right_trigger"), "keyboard": ("n", "m")}
+
+
+@pytest.fixture(params=FORWARD)
+def driven(request):
+    made = Driven(request.param, model=MODEL)
+    made.begin()
+    return made
+
+
+def own(driven, *groups):
+    channels = driven.person.meaning.channels
+    driven.person.ask(Ask("mask", tuple(np.flatnonzero(channels.mask(*groups)).tolist())))
+
+
+def moved(driven, **controls):
+    """Return the channels that some controls move, one after the other."""
+    found = []
+    for control, value in controls.items():
+        driven.main.values[control] = float(value)
+        intent = driven.act()
+        found.append({driven.person.meaning.channels.names[n] for n in np.flatnonzero(intent.raw.values)})
+        del driven.main.values[control]
+        driven.act()
+    return found
+
+
+def test_a_control_goes_to_the_other_hand(driven):
+    device = driven.main.name
+    (control, value) = FORWARD[device]
+    for hand in ("left", "right", "left"):
+        assert moved(driven, **{control: value}) == [{f"{hand}.vx"}]
+        assert f"active hand {hand}" in driven.shown()
+        driven.main.presses = [OTHER[device]]
+        driven.act()
+
+
+@pytest.mark.parametrize("device", GRIPS)
+def test_each_gripper_has_a_control_of_its_own(device):
+    driven = Driven(device, model=MODEL)
+    driven.begin()
+    for control, grippers in zip(GRIPS[device] * 2, [(1, 0), (1, 1), (0, 1), (0, 0)], strict=True):
+        driven.main.presses = [control]
+        assert driven.act().grippers == grippers
+
+
+def test_what_moves_something_asks_for_nothing_but_the_stop():
+    driven = Driven("gamepad", model=MODEL)
+    driven.begin()
+    own(driven, "base", "left")
+    driven.main.presses, driven.main.values["left_trigger"] = ["left_trigger"], 1.0  # lowers the hand there
+    intent = driven.act()
+    assert intent.grippers == (0.0, 0.0)
+    assert intent.raw.values.any()
+    table = load_map("gamepad", CONTROLS["gamepad"])
+    stop = table.meant(driven.main.input(Steered(True, False)), ["b"], {"b": ("ee.vx", 1)})
+    assert stop.presses == ("stop",)
+
+
+def test_two_hands_at_once_have_a_stick_or_keys_each():
+    driven = Driven("gamepad", model=MODEL)
+    driven.begin()
+    own(driven, "ee")
+    sticks = {"left_x": -1, "left_y": -1, "right_x": -1, "right_y": -1}
+    assert moved(driven, **sticks) == [{"left.vy"}, {"left.vx"}, {"right.vy"}, {"right.vx"}]
+    driven.main.presses = ["right_stick"]
+    driven.act()
+    assert moved(driven, **sticks) == [{"left.wz"}, {"left.vz"}, {"right.wz"}, {"right.vz"}]
+    keys = Driven("keyboard", model=MODEL)
+    keys.begin()
+    own(keys, "ee")
+    assert moved(keys, w=1, i=1, r=1, u=1, q=1) == [
+        {"left.vx"}, {"right.vx"}, {"left.vz"}, {"right.vz"}, {"left.wz"},
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("device", ["gamepad", "keyboard"])
+def test_a_pair_is_moved_as_one_hand_and_parted(device):
+    driven = Driven(device, model=MODEL)
+    driven.begin()
+    own(driven, "pair", "apart")
+    control, value = FORWARD[device]
+    assert moved(driven, **{control: value}) == [{"pair.vx"}]
+    for _ in range(2 if device == "gamepad" else 0):
+        driven.main.presses = ["right_stick"]
+        driven.act()
+    control = "right_y" if device == "gamepad" else "9"
+    driven.main.values[control] = 1.0
+    assert driven.act().values[driven.person.meaning.channels.names.index("apart.v")] < 0.0
+    assert "apart" in driven.shown()
+
+
+def test_one_silent_device_brakes_both_hands(driven):
+    own(driven, "ee")
+    driven.main.attended = False
+    assert driven.act() is EpisodeEvent.PAUSE
