@@ -49,9 +49,9 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
 
     def __post_init__(self) -> None:
         """Say what a policy reads and writes."""
-        config, model = self.session(), load_model(self.robot)
+        config, model = self.session(), load_model(self.robot).with_hand(self.hand)
         mode = build_mode(config, model) if self.mode else MODES["direct"]
-        actions = len(ModeAction(mode, Channels.of(model.description)).names)
+        actions = len(ModeAction(mode, Channels.of(model.description), model.hand.name).names)
         robot, scene = len(AgentObservation(model).names), len(build_task(config).state_names)
         self.features = {
             ACTION: PolicyFeature(FeatureType.ACTION, (actions,)),

@@ -21,6 +21,8 @@ class SimulatedConfig:
     """What to do."""
     robot: str = SessionConfig.robot
     """A robot, or a description file (.toml)."""
+    hand: str = ""
+    """Which hand does the task, of a robot with several: its name; the first by default."""
     camera_names: str = ""
     """Cameras of the robot, or scene, with commas; none by default."""
     image_size: int | str = SessionConfig.image_size
@@ -36,6 +38,7 @@ class SimulatedConfig:
         config = SessionConfig(
             task=self.task,
             robot=self.robot,
+            hand=self.hand,
             cameras=self.camera_names,
             image_size=self.image_size,
             moving_obstacles=self.moving_obstacles,

@@ -51,7 +51,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         self._env, self._first_seed, self._painter = env, first_seed, None
         own = build_mode(config, env.model) if mode else _WHOLE
         channels = Channels.of(env.model.description)
-        self._actions = tuple(ModeAction(each, channels) for each in (own, _WHOLE))
+        self._actions = tuple(ModeAction(each, channels, env.model.hand.name) for each in (own, _WHOLE))
         self._loop = mode_loop(env, config.task, own, _WHOLE)
         self._joined = scene_in_state
         self._tools = [hand.named("tool") for hand in env.model.description.hands]

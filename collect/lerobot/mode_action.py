@@ -1,6 +1,6 @@
 """What LeRobot's action is: the channels of a teleop mode as plain numbers, and back."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -20,28 +20,31 @@ from handrail.controllers.interface.intent import Intent, decided_gripper
 # what a teleoperator presses: in its action beside the channels, and in no dataset
 NEXT, AGAIN, HOLD = "handrail.next", "handrail.again", "handrail.hold"
 BUTTONS = (NEXT, AGAIN, HOLD)
-_FOCUS, _GRIPPER = "focus", "gripper"
+_FOCUS = "focus"
 _HALF = 0.5  # a focus beyond it is the base's, a button beyond it is pressed
 
 
 class ModeAction:
-    """The action of a mode: every channel that it owns with some focus, the focus, and the gripper.
+    """The action of a mode: every channel that it owns with some focus, the focus, and the grippers.
 
     Args:
         mode: teleop mode.
         channels: of the robot.
+        hand: which of several hands does the task: its name.
 
     Attributes:
         names: LeRobot's, of the numbers; `focus` (0 hand, 1 base) only where the mode makes a difference.
     """
 
-    def __init__(self, mode: TeleopMode, channels: Channels) -> None:
+    def __init__(self, mode: TeleopMode, channels: Channels, hand: str = "") -> None:
         self._mode, self._channels = mode, channels
-        self._hand, self._base = (channels.mask(*mode.owned(focus)) for focus in ("hand", "base"))
+        self._hand, self._base = (channels.mask(*mode.owned(focus, hand)) for focus in ("hand", "base"))
         self._owned = np.flatnonzero(self._hand | self._base)
         focus = (_FOCUS,) if mode.by_focus else ()
-        hands = [names[0].split(".")[0] for names in channels.hands]
-        self._grippers = (_GRIPPER,) if len(hands) == 1 else tuple(f"{hand}.{_GRIPPER}" for hand in hands)
+        self._grippers = channels.grippers
+        twists = [channels.hand_slice(number) for number in range(len(channels.hands))]
+        pair = channels.pair_slice.start
+        self._twists = [*twists, *([slice(pair, pair + 6)] if channels.pair else [])]
         self._own = (*(channels.names[i] for i in self._owned), *focus, *self._grippers)
         self.names = tuple(map(lerobot_name, self._own))
 
@@ -71,17 +74,18 @@ class ModeAction:
             )
         return np.array(found, float)
 
-    def action(self, intent: Intent, rotation: FloatArray) -> dict[str, float]:
-        """Return an intent as an action, the hand's twist in the world's axes.
+    def action(self, intent: Intent, rotations: Sequence[FloatArray]) -> dict[str, float]:
+        """Return an intent as an action, the hands' twists in the world's axes.
 
         Args:
             intent: what an operator asks for.
-            rotation: of the tool, (3, 3), for an intent that is meant in its axes.
+            rotations: of the tools, (3, 3) each, for an intent that is meant in their axes; a pair's is in
+                those of the first.
         """
         values = np.where(intent.mask, intent.values, 0.0)
         if intent.frames.tool == "tool":
-            twist = values[self._channels.hand_slice()].reshape(2, 3)
-            values[self._channels.hand_slice()] = (twist @ rotation.T).ravel()
+            for part, rotation in zip(self._twists, (*rotations, rotations[0]), strict=False):
+                values[part] = (values[part].reshape(2, 3) @ rotation.T).ravel()
         focus = (np.array_equal(intent.mask, self._base),) if self._mode.by_focus else ()
         numbers = (*values[self._owned], *focus, *intent.grippers)
         return dict(zip(self.names, map(float, numbers), strict=True))

@@ -113,7 +113,7 @@ class HandrailSim(Uncalibrated, Robot):
         self.env = build_env(self.session, config.fps)
         self.mode = build_mode(self.session, self.env.model)
         self._channels = Channels.of(self.env.model.description)
-        self.action = ModeAction(self.mode, self._channels)
+        self.action = ModeAction(self.mode, self._channels, self.env.model.hand.name)
         self.loop = mode_loop(self.env, self.session.task, self.mode, _TOWARD)
         self.cameras = dict.fromkeys(self.env.cameras)  # LeRobot counts them
         self.scene, self.episodes, self.frame = -1, 0, None
@@ -129,7 +129,7 @@ class HandrailSim(Uncalibrated, Robot):
 
     @cached_property
     def action_features(self) -> dict[str, type]:
-        """Names of the numbers of an action: the mode's channels and the gripper."""
+        """Names of the numbers of an action: the mode's channels and the grippers."""
         return dict.fromkeys(self.action.names, float)
 
     @property

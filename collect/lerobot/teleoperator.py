@@ -82,7 +82,7 @@ class SimTeleoperator(Uncalibrated, Teleoperator):
         asked = self._operator.act(view)
         if isinstance(asked, EpisodeEvent):
             return robot.action.still(robot.grippers) | {_BUTTONS.get(asked, HOLD): 1.0}
-        return robot.action.action(asked, view.tool.rotation)
+        return robot.action.action(asked, [tool.rotation for tool in view.task.tools])
 
     @abstractmethod
     def _made(self, robot: HandrailSim) -> Any:

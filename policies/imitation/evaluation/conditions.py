@@ -28,6 +28,7 @@ from handrail.datasets.reading.reader import read_episodes, read_info
 from handrail.datasets.storage.strict_json import load_json, read_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import (
+    MIXED,
     NAME,
     PolicyMeta,
     model_folder,
@@ -90,12 +91,17 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     ROBOTS.admit(meta.robot, (config.robot,))
     sizes, pictures = _features(settings, where)
     pictures |= meta.cameras
+    robot = meta.robot if meta.robot in ROBOTS else config.robot
     if meta.interface is None:
-        robot = meta.robot if meta.robot in ROBOTS else config.robot
         task = meta.environment if meta.environment in TASKS else config.task
         if not (robot and task):
             raise HandrailError(f"{where}: expected --robot and --task: neither it nor its dataset says them")
-        meta = replace(meta, environment=task, robot=robot)
+        meta = replace(meta, environment=task)
+    meta = replace(meta, robot=robot or meta.robot, hand=config.hand or meta.hand)
+    if meta.hand == MIXED:
+        raise HandrailError(f"{where}: expected --hand: in its demonstrations several hands do the task")
+    if meta.interface and Channels.of(load_description(meta.robot)).names != meta.interface.channels:
+        raise HandrailError(f"{where}: expected a robot with its channels, got --robot {meta.robot}")
     if not TASKS.accepts(meta.environment):
         raise HandrailError(f"{where}: expected a task of {', '.join(TASKS)}, got {meta.environment!r}")
     cameras = load_description(meta.robot).camera_names
@@ -168,9 +174,9 @@ def _scene(given: Mapping[str, int], where: str, meta: PolicyMeta) -> tuple[int,
 
 def mode_action(meta: PolicyMeta) -> ModeAction:
     """Return what a policy writes that writes what was recorded."""
-    model = load_model(meta.robot)
+    model = load_model(meta.robot).with_hand(meta.hand)
     mode = build_mode(SessionConfig(task=meta.environment, mode=meta.intent_mode or "direct"), model)
-    return ModeAction(mode, Channels.of(model.description))
+    return ModeAction(mode, Channels.of(model.description), model.hand.name)
 
 
 def _digest(folder: Path) -> str:
@@ -205,6 +211,7 @@ class PolicyCondition:
         """What all rollouts of this label have in common."""
         return {
             **{name: str(getattr(self.checkpoint.meta, name)) for name in _SAID},
+            **({"hand": hand} if (hand := self.checkpoint.meta.hand) else {}),
             "protection": self.protection,
             "perturbation": self.perturbation.text,
             "time_limit": f"{self.time_limit:g}",

@@ -48,6 +48,8 @@ class EvaluateConfig(ExecutionConfig):
     it is imported only if you say it too."""
     robot: Advanced[str] = ""
     """The robot of policies that do not say it, or that say a module:name."""
+    hand: Advanced[str] = ""
+    """Which hand does the task, of a robot with several; that of the demonstrations by default."""
     fps: Advanced[Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])]] = 20
     """Decisions a second of such policies: the rate of their dataset [Hz]."""
     time_limit: Advanced[Annotated[float, Meta(ge=0, le=MOST_TIME)]] = 0.0

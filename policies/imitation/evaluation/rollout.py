@@ -210,6 +210,7 @@ def _session_config(condition: PolicyCondition) -> SessionConfig:
         cameras=",".join(checkpoint.pictures),
         image_size=f"{width}x{height}",
         time_limit=condition.time_limit,
+        hand=checkpoint.meta.hand,
     )
 
 

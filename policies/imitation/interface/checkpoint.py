@@ -29,6 +29,7 @@ from handrail.policies.imitation.interface.trust import CONFIG
 FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
 MODEL = "pretrained_model"
+MIXED = "mixed"
 Fps = Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])]
 RobotName = Annotated[str, Meta(max_length=200, pattern=r"\A[\w+:,.\- ]*(?<!\.toml)\Z")]
 
@@ -87,6 +88,8 @@ class PolicyMeta:
     """That its episodes had at most [s]; 0 if that was the task's own, or they do not say."""
     cameras: Mapping[Name, tuple[Count, Count]] = field(default_factory=dict)
     """Height and width of the pictures that its encoder reads [px], by camera."""
+    hand: Name = ""
+    """Which of several hands does the task; "mixed" if several did, "" of one hand."""
     validation: Mapping[Annotated[str, Meta(pattern=r"\A[0-9]+\Z")], Number] = field(default_factory=dict)
     """Loss on the episodes that were held out, by update."""
 
@@ -102,7 +105,7 @@ def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> tuple[str
     A robot that is the path of a file is called as the dataset calls it.
     """
     found = [{str(row.get(name) or "") for row in rows} for name in ("environment", "mode", "robot")]
-    task, mode, robot = (each.pop() if len(each) == 1 else "mixed" for each in found)
+    task, mode, robot = (each.pop() if len(each) == 1 else MIXED for each in found)
     is_name = robot and "/" not in robot and not robot.endswith(".toml")
     return task, mode, robot if is_name else info.robot_type
 
@@ -125,6 +128,8 @@ def read_meta(folder: Path) -> PolicyMeta:
 def write_meta(folder: Path, meta: PolicyMeta) -> None:
     """Write `handrail.json` into a `pretrained_model` folder."""
     content = {"format": FORMAT} | asdict(meta)
+    if not meta.hand:  # of robots with one hand the file is as it was
+        del content["hand"]
     write_whole(folder / NAME, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
 

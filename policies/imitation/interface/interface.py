@@ -20,8 +20,8 @@ from handrail.controllers.typed import Text
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.relative import (
     BASE_SEEN,
+    POSE,
     SEEN,
-    TOOL,
     TOOL_SEEN,
     RobotPose,
     rotations,
@@ -32,7 +32,6 @@ Columns = Mapping[str, np.ndarray]
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 VALUES, MASK = "teleop.values", "teleop.mask"
 COLUMNS = (STATE, ENVIRONMENT, ACTION, VALUES, MASK)
-_GRIPPER = "gripper"
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,9 @@ class PolicyInterface:
             base_pose: whether it shall see where the base is.
         """
         state, environment, values = (_names(features, key) for key in (STATE, ENVIRONMENT, VALUES))
-        channels = tuple(name for name in values if name != _GRIPPER)
+        hands = {name.removesuffix("vx") for name in values if name.endswith(".vx")}
+        grippers = {f"{hand}gripper" for hand in (*hands, "")}
+        channels = tuple(name for name in values if name not in grippers)
         masks: set[tuple[bool, ...]] = set()
         for columns in episodes if actions == "intent" else ():
             rows = columns[MASK][:, : len(channels)].astype(bool)
@@ -92,14 +93,20 @@ class PolicyInterface:
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of what the policy reads: state, environment."""
         base = BASE_SEEN if self._shows_base else ()
-        around = (f"{name}.{part}" for name, parts, _ in self.objects for part in SEEN.get(parts, parts))
-        return (*self._own, *TOOL_SEEN, *base), tuple(around)
+        tools = (f"{tool}.{part}" for tool in self.tools for part in TOOL_SEEN)
+        around = (
+            f"{name}.{hand}{part}"
+            for name, parts, _ in self.objects
+            for hand in (self._seers if parts in SEEN else ("",))
+            for part in SEEN.get(parts, parts)
+        )
+        return (*self._own, *tools, *base), tuple(around)
 
     @property
     def action_names(self) -> tuple[str, ...]:
-        """Names of what the policy writes: channels, a number for each mask if several, the gripper, (a,)."""
+        """Names of what the policy writes: channels, a number for each mask if several, grippers, (a,)."""
         flags = (f"mask.{index}" for index in range(len(self.masks)) if len(self.masks) > 1)
-        return (*(self.channels[index] for index in self._commanded), *flags, _GRIPPER)
+        return (*(self.channels[index] for index in self._commanded), *flags, *self._known.grippers)
 
     @property
     def is_partial(self) -> bool:
@@ -111,21 +118,24 @@ class PolicyInterface:
         if state.ndim == 1:
             numbers = self.observe(state[None], environment[None])
             return numbers[0][0], numbers[1][0]
-        state, environment, pose = np.asarray(state, float), np.asarray(environment, float), self.pose(state)
-        own = [self._of(state, self._own), pose.tool_seen, *([pose.base_seen] if self._shows_base else [])]
+        state, environment = np.asarray(state, float), np.asarray(environment, float)
+        poses = [self.pose(state, hand) for hand in range(len(self.tools))]
+        base = [poses[0].base_seen] if self._shows_base else []
+        own = [self._of(state, self._own), *(pose.tool_seen for pose in poses), *base]
         around: list[FloatArray] = [np.zeros((len(state), 0))]
         for _, parts, start in self.objects:
-            around.append(seen(parts, environment[:, start : start + len(parts)], pose))
+            numbers = environment[:, start : start + len(parts)]
+            around += [seen(parts, numbers, pose) for pose in (poses if parts in SEEN else poses[:1])]
         return np.column_stack(own).astype(np.float32), np.column_stack(around).astype(np.float32)
 
     def encode(self, columns: Columns) -> FloatArray:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
         state = columns[STATE].astype(float)
         if self.masks:
-            values, gripper = np.split(columns[VALUES].astype(float), [-1], axis=1)
+            values, grippers = np.split(columns[VALUES].astype(float), [len(self.channels)], axis=1)
         else:  # the next frame's joint velocities, the last frame's its own
             velocities = self._of(state, [f"{joint}.vel" for joint in self._joints])
-            gripper = columns[ACTION][:, -1]
+            grippers = columns[ACTION][:, -len(self.tools) :]
             values = np.zeros((len(state), len(self.channels)))
             values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
         pose = self.pose(state)
@@ -133,7 +143,7 @@ class PolicyInterface:
             values[:, pair] = pose.turned(values[:, pair])
         rows = columns[MASK][:, : len(self.channels)].astype(bool)
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
-        return np.column_stack([values[:, self._commanded], *flags, gripper]).astype(np.float32)
+        return np.column_stack([values[:, self._commanded], *flags, grippers]).astype(np.float32)
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
@@ -143,12 +153,12 @@ class PolicyInterface:
         values[0, self._commanded] = action[:count]
         for pair in self._pairs:
             values[:, pair] = pose.turned_back(values[:, pair])
-        flags = action[count:-1]
+        flags, grippers = np.split(action[count:], [-len(self.tools)])
         mask = np.array(self._sets[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
-        return Intent(values[0], mask, (decided_gripper(action[-1]),))
+        return Intent(values[0], mask, tuple(map(decided_gripper, grippers.tolist())))
 
     def asked(self, action: FloatArray, state: FloatArray) -> FloatArray:
-        """Return the values of the channels that an action (a,) asks for, the focus (1 base), the gripper.
+        """Return the values of the channels that an action (a,) asks for, the focus (1 base), the grippers.
 
         The focus is there where the operator owned several sets of channels; NaN stays, and brakes the robot.
         """
@@ -164,9 +174,20 @@ class PolicyInterface:
     def _joints(self) -> tuple[str, ...]:
         return tuple(name.removeprefix("joint.") for name in self._known.joints)
 
+    @cached_property
+    def tools(self) -> tuple[str, ...]:
+        """Names of the hands' tools, as recorded."""
+        return tuple(name.removesuffix("gripper") + "tool" for name in self._known.grippers)
+
+    @property
+    def _seers(self) -> tuple[str, ...]:
+        """The hands from which an object is seen, as its numbers' names have them; "" of one hand."""
+        return tuple(tool.removesuffix("tool") for tool in self.tools)
+
     @property
     def _needed(self) -> tuple[str, ...]:
-        return (*TOOL, *(f"{joint}.{kind}" for joint in self._joints for kind in ("pos", "vel")))
+        tools = (f"{tool}.{part}" for tool in self.tools for part in POSE)
+        return (*tools, *(f"{joint}.{kind}" for joint in self._joints for kind in ("pos", "vel")))
 
     @property
     def _shows_base(self) -> bool:
@@ -174,7 +195,7 @@ class PolicyInterface:
 
     @cached_property
     def _own(self) -> tuple[str, ...]:
-        """The arm's joints, and numbers of the state that are neither a joint's nor the tool's."""
+        """The arms' joints, and numbers of the state that are neither a joint's nor a tool's."""
         arm = self._joints[3:] if self._known.base else self._joints
         others = (name for name in self.state_names if name not in self._needed)
         return (*(f"{joint}.pos" for joint in arm), *others)
@@ -190,13 +211,13 @@ class PolicyInterface:
             start += len(parts)
         return found
 
-    def pose(self, state: FloatArray) -> RobotPose:
-        """Return where the robot is, from recorded states, (T, s)."""
+    def pose(self, state: FloatArray, hand: int = 0) -> RobotPose:
+        """Return where the robot is, and the tool of one hand, from recorded states, (T, s)."""
         state = np.asarray(state, float)
         base = np.zeros((len(state), 3))
         if self._known.base:
             base = self._of(state, [f"{joint}.pos" for joint in self._joints[:3]])
-        tool = self._of(state, TOOL)
+        tool = self._of(state, [f"{self.tools[hand]}.{part}" for part in POSE])
         return RobotPose(base, tool[:, :3], rotations(tool[:, 3:]))
 
     def _of(self, state: FloatArray, names: Sequence[str]) -> FloatArray:
@@ -215,8 +236,11 @@ class PolicyInterface:
     @cached_property
     def _pairs(self) -> list[list[int]]:
         """(x, y) pairs of velocities along the world's axes; one that a mask splits stays so."""
-        tool, joint = self._known.hand_slice().start, self._known.joint_slice.start
-        starts = (tool, tool + 3, joint) if self._known.base else (tool, tool + 3)
+        known = self._known
+        twists = [known.hand_slice(hand).start for hand in range(len(known.hands))]
+        twists += [known.pair_slice.start] if known.pair else []
+        starts = [first for twist in twists for first in (twist, twist + 3)]
+        starts += [known.joint_slice.start] if known.base else []
         return [[s, s + 1] for s in starts if all(mask[s] == mask[s + 1] for mask in self._sets)]
 
 

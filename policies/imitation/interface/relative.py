@@ -8,8 +8,9 @@ With `R_wb` the base's heading and `(p_t, R_t)` the tool's pose, the pose `(p_o,
     n_r = p / √(|p|² + r²)      the same up close, for several r: a direction from afar, (3,) each
 
 and the tool itself is seen from the base: `R_wbᵀ (p_t − p_b)`, `R_wbᵀ R_t`. So a motion learnt in one place
-is the same motion everywhere, and what an operator steers to zero is an input. `E` is smooth, unlike a
-rotation vector; `p` and `E − Eᵀ` vanish at the goal.
+is the same motion everywhere, and what an operator steers to zero is an input. With several hands an object
+is seen from each of them (`goal.left.dx`), and each tool from the base (`left.tool.x`). `E` is smooth, unlike
+a rotation vector; `p` and `E − Eᵀ` vanish at the goal.
 
 Operators also steer by where the base is: who steers joints drives it to where they mean to stand, with a
 heading in the world's axes. So it is seen too, `(x, y, cos θ, sin θ)` in the frame of the joint positions, in
@@ -36,9 +37,8 @@ _OFFSET = ("dx", "dy", "dz", *(f"near_{r:g}.{axis}" for r in _NEAR for axis in P
 _MATRIX = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
 SEEN = {POSE: (*_OFFSET, *_MATRIX), POSITION: _OFFSET}
 """The names of what a policy reads of an object, by those of its numbers; of other numbers as they are."""
-TOOL = tuple(f"tool.{part}" for part in POSE)
-"""The tool's pose, as recorded."""
-TOOL_SEEN = tuple(f"tool.{part}" for part in (*POSITION, *_MATRIX))
+TOOL_SEEN = (*POSITION, *_MATRIX)
+"""The names of what a policy reads of a tool, behind the tool's own."""
 BASE_SEEN = ("base.x", "base.y", "base.cos", "base.sin")
 
 

@@ -32,7 +32,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.typed import Name, decoded
-from handrail.policies.imitation.interface.checkpoint import Fps
+from handrail.policies.imitation.interface.checkpoint import MIXED, Fps
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import (
     PolicyEncoderStep,
@@ -60,6 +60,8 @@ class Completion:
     mode: Name
     fps: Fps
     """Intents a second [Hz]."""
+    hand: Name = ""
+    """Which of several hands does the task."""
 
 
 class CompletedRobot:
@@ -73,17 +75,18 @@ class CompletedRobot:
     def __init__(self, interface: PolicyInterface, by: Completion) -> None:
         for registry, name in ((ROBOTS, by.robot), (TASKS, by.task), (MODES, by.mode)):
             registry.admit(name)
-        model = load_model(by.robot)
+        model = load_model(by.robot).with_hand(by.hand)
         if Channels.of(model.description).names != interface.channels:
             raise HandrailError(f"completion of intents: expected the channels of {by.robot}, got others")
         self._interface, self._by, self._n = interface, by, model.size
+        self._tools = [hand.named("tool") for hand in model.description.hands]
         self._controller = build_controller(MODES.find(by.mode), model, by.fps, by.task)
         self._time, self._around = np.inf, b""
 
     def velocities(
         self, action: FloatArray, state: FloatArray, time: FloatArray, sent: FloatArray, around: FloatArray
     ) -> FloatArray:
-        """Return velocities and gripper, (n + 1,); an episode begins where the time is not later.
+        """Return velocities and grippers, (n + h,); an episode begins where the time is not later.
 
         Args:
             action: of the policy, (a,); one that is not finite brakes.
@@ -94,9 +97,9 @@ class CompletedRobot:
         """
         now, n = float(time[0]), self._n
         if now <= self._time:
-            self._controller.reset(from_numbers(around))
+            self._controller.reset(from_numbers(around, self._tools))
         elif around.tobytes() != self._around:
-            self._controller.update_scene(from_numbers(around))
+            self._controller.update_scene(from_numbers(around, self._tools))
         self._time, self._around = now, around.tobytes()
         intent = Intent(
             np.full(len(self._interface.channels), np.nan), np.ones(len(self._interface.channels), bool)
@@ -173,8 +176,8 @@ class PolicyViewStep(PolicyStep):
 class PolicyActionStep(PolicyStep):
     """Turns what a policy writes, in the base's axes, into an action in those of the world.
 
-    Joint velocities and the gripper; or the channels of a teleop mode, the focus (1 base) where it has two,
-    and the gripper: the action of `lerobot-eval --env.mode`.
+    Joint velocities and the grippers; or the channels of a teleop mode, the focus (1 base) where it has two,
+    and the grippers: the action of `lerobot-eval --env.mode`.
     """
 
     def __post_init__(self) -> None:
@@ -271,8 +274,9 @@ def with_steps(
     first = normalisers[0] if normalisers else len(steps)
     steps[first:first] = [*([encoder_step(encoder)] if encoder else []), view]
     act = PolicyActionStep(described)
-    if interface.is_partial and by and by.robot in ROBOTS and by.task in TASKS and by.mode in MODES:
-        act = PolicyCompletionStep(described, asdict(by))
+    known = by and by.robot in ROBOTS and by.task in TASKS and by.mode in MODES and by.hand != MIXED
+    if interface.is_partial and by and known:
+        act = PolicyCompletionStep(described, {name: each for name, each in asdict(by).items() if each})
     return replace(before, steps=steps), replace(after, steps=[*after.steps, act])
 
 

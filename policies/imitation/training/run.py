@@ -217,7 +217,7 @@ class TrainingRun:
         folder = get_step_checkpoint_dir(self._folder, self._settings.steps, meta.steps)
         draft = folder.with_name(f".{folder.name}")
         shutil.rmtree(draft, ignore_errors=True)
-        completion = Completion(meta.robot, meta.environment, meta.mode, meta.fps)
+        completion = Completion(meta.robot, meta.environment, meta.mode, meta.fps, meta.hand)
         around = with_steps(self._before, self._after, meta.interface, completion, self._encoder)
         policy, sizes = self._accelerator.unwrap_model(self._policy), self._settings.batch_size
         parts = (policy, self._optimizer, self._schedule, *around)

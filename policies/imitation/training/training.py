@@ -13,12 +13,14 @@ from lerobot.configs.default import DatasetConfig
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
 
+from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_task
 from handrail.collect.session.recorded import COLUMN, recorded_settings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.versions import TRAINING, versions
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
+    MIXED,
     MODEL,
     PolicyMeta,
     last_checkpoint,
@@ -126,6 +128,8 @@ def _is_checkpoint(path: Path) -> bool:
 
 def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> PolicyMeta:
     config, rows = source.config, source.selection.rows
+    recorded = _recorded(rows)
+    hands = {each.hand for each in recorded}
     return PolicyMeta(
         source.interface,
         *origin_of(source.info, rows),
@@ -141,19 +145,27 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> Po
         sizes=resolved(config),
         episodes=tuple(int(row["episode_index"]) for row in rows),
         data=source.digest,
-        time_limit=_time_limit(rows),
+        time_limit=_time_limit(recorded),
+        hand=hands.pop() if len(hands) == 1 else MIXED * bool(hands),
         cameras=source.encoder.reads.pictures if source.encoder else {},
         validation={str(step): loss for step, loss in losses.items()},
     )
 
 
-def _time_limit(rows: Sequence[Mapping[str, Any]]) -> float:
-    """Return the longest time that episodes were given [s]; 0 for the task's own, or if one does not say."""
+def _recorded(rows: Sequence[Mapping[str, Any]]) -> list[SessionConfig]:
+    """Return the settings of episodes, each once; none if one does not say."""
     try:
-        settings = [recorded_settings(row) for row in {str(row.get(COLUMN)): row for row in rows}.values()]
-        if not any(each.time_limit for each in settings):
-            return 0.0
-        return float(max(build_task(each).horizon for each in settings))
+        return [recorded_settings(row) for row in {str(row.get(COLUMN)): row for row in rows}.values()]
+    except HandrailError:
+        return []
+
+
+def _time_limit(recorded: Sequence[SessionConfig]) -> float:
+    """Return the longest time that episodes were given [s]; 0 for the task's own, or if one does not say."""
+    if not any(each.time_limit for each in recorded):
+        return 0.0
+    try:
+        return float(max(build_task(each).horizon for each in recorded))
     except HandrailError:
         return 0.0
 

@@ -17,6 +17,7 @@ from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from lerobot.processor import PolicyProcessorPipeline
 from training_helpers import CHANNELS, ENVIRONMENT, STATE, frame, tiny
 
+import handrail.collect.lerobot.plugins  # noqa: F401  (registers the environment)
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env
 from handrail.collect.world.observation import to_numbers
