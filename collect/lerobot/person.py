@@ -17,7 +17,7 @@ from handrail.collect.lerobot.sim import HandrailSim
 from handrail.collect.lerobot.teleoperator import SimTeleoperator
 from handrail.datasets.presentation.terminal import Terminal
 
-_REFUSED = ("mode", "mask", "lock", "practice", "undo", "quit")  # LeRobot's loop has none of them
+_REFUSED = ("mode", "mask", "hand", "lock", "practice", "undo", "quit")  # LeRobot's loop has none of them
 
 
 class HandrailCockpit(SimTeleoperator):
