@@ -20,7 +20,7 @@ from handrail.collect.devices.key_bytes import NAMES
 from handrail.collect.devices.keyboard import Keyboard, has_terminal
 from handrail.collect.devices.leader_arm import LeaderArm, make_teleoperator
 from handrail.collect.devices.local_person import LocalPerson
-from handrail.collect.devices.spacemouse import SpaceMouse
+from handrail.collect.devices.spacemouse import SpaceMice, SpaceMouse
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.person.inputs import Ask
 from handrail.collect.operators.person.person import Person
@@ -76,7 +76,7 @@ def _reader(name: str, teleop: TeleopConfig, hands: int) -> DeviceReader:
     shape = StickShape(teleop.dead_zone, teleop.exponent)
     device, controls = {
         "gamepad": (Gamepad(shape), gamepad.CONTROLS),
-        "spacemouse": (SpaceMouse(shape), spacemouse.CONTROLS),
+        "spacemouse": (SpaceMice(shape) if hands > 1 else SpaceMouse(shape), spacemouse.CONTROLS),
         "keyboard": (Keyboard(), NAMES),
     }[name]
     return DeviceReader(device, load_map(name, controls, teleop.map, hands))

@@ -9,7 +9,9 @@ from handrail.collect.devices.device import DeviceInput, StickShape
 from handrail.controllers.errors import HandrailError, not_installed
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-CONTROLS = (*AXES, *(f"button_{number}" for number in range(1, 33)))
+_OWN = (*AXES, *(f"button_{number}" for number in range(1, 33)))
+_OTHER = "second_"  # the controls of another one are named so
+CONTROLS = (*_OWN, *(_OTHER + name for name in _OWN))
 _OF_DEVICE = (1, 0, 2, 4, 3, 5)  # forward, left, up, and the turns about them: among right, backward, down
 _FULL = 350.0  # of an axis, as the device counts
 _MOST = 2.0  # times that no device says
@@ -32,31 +34,30 @@ class SpaceMouse:
     Args:
         shape: of its axes.
         clock: of readings [s].
+        number: of those that are plugged in, from 0.
     """
 
     name = "spacemouse"
 
-    def __init__(self, shape: StickShape | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        self._shape, self._clock = shape or StickShape(), clock
+    def __init__(
+        self, shape: StickShape | None = None, clock: Callable[[], float] = time.monotonic, number: int = 0
+    ) -> None:
+        self._shape, self._clock, self._number = shape or StickShape(), clock, number
         self._hid: Any = None
 
     def open(self) -> None:
         """Find a SpaceMouse."""
-        try:
-            import hid
-        except ImportError as error:
-            raise not_installed("--operator spacemouse", "hidapi", "devices") from error
-        found = next((each for each in hid.enumerate() if _is_one(each)), None)
-        if found is None:
+        hid, found = _plugged()
+        if len(found) <= self._number:
             raise HandrailError("SpaceMouse: expected one, found none; plug it in, then try again")
         self._axes: dict[str, float] = dict.fromkeys(AXES, 0.0)
         self._down: frozenset[str] = frozenset()
         self._heard = 0.0
         self._hid = hid.device()
         try:
-            self._hid.open_path(found["path"])
+            self._hid.open_path(found[self._number])
         except OSError as error:
-            where = found["path"].decode(errors="replace")
+            where = found[self._number].decode(errors="replace")
             raise HandrailError(
                 f"SpaceMouse: {where} may not be read; put the line {_RULE} "
                 "into /etc/udev/rules.d/70-spacemouse.rules, plug it in again"
@@ -99,6 +100,51 @@ class SpaceMouse:
             self._axes[name] = self._shape(-counts[at] / _FULL)
         self._heard = self._clock()
         return []
+
+
+class SpaceMice:
+    """One SpaceMouse, or two as one device, a hand each: in doubt of one, both are left alone.
+
+    Args:
+        shape: of their axes.
+        clock: of readings [s].
+    """
+
+    name = "spacemouse"
+
+    def __init__(self, shape: StickShape | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._caps = [SpaceMouse(shape, clock, number) for number in range(2)]
+        self._open = self._caps[:1]
+
+    def open(self) -> None:
+        """Find one or two, in the order of their addresses."""
+        self._open = self._caps[: max(1, len(_plugged()[1]))]
+        for cap in self._open:
+            cap.open()
+
+    def read(self) -> DeviceInput:
+        """Return the axes and buttons of both."""
+        one, *others = (cap.read() for cap in self._open)
+        for each in others:
+            moved = {_OTHER + name: value for name, value in each.deflections.items()}
+            presses = (*one.presses, *(_OTHER + name for name in each.presses))
+            time, attended = min(one.time, each.time), one.attended and each.attended
+            one = DeviceInput(time, {**one.deflections, **moved}, presses, attended=attended)
+        return one
+
+    def close(self) -> None:
+        """Give them back."""
+        for cap in self._open:
+            cap.close()
+
+
+def _plugged() -> tuple[Any, list[bytes]]:
+    """Return hidapi, and the addresses of those that are plugged in."""
+    try:
+        import hid
+    except ImportError as error:
+        raise not_installed("--operator spacemouse", "hidapi", "devices") from error
+    return hid, sorted({each["path"] for each in hid.enumerate() if _is_one(each)})
 
 
 def _is_one(device: dict[str, Any]) -> bool:

@@ -1,11 +1,16 @@
 """Laws of a person at this computer who steers a robot with two hands: which control moves which hand."""
 
+import sys
+from copy import copy
+
 import numpy as np
 import pytest
+from device_players import PlayedHid
 from driven_person import CONTROLS, FORWARD, Driven
 from places import TIAGO
 
 from handrail.collect.devices.control_map import Steered, load_map
+from handrail.collect.devices.spacemouse import SpaceMice
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.operators.person.inputs import Ask
 from handrail.controllers.robot.model import load_model
@@ -108,3 +113,63 @@ def test_one_silent_device_brakes_both_hands(driven):
     own(driven, "ee")
     driven.main.attended = False
     assert driven.act() is EpisodeEvent.PAUSE
+
+
+FORWARD_CAP = bytes.fromhex("010000a2fe0000")  # y = −350, and it counts backward
+
+
+class TwoHids:
+    """Stands in for hidapi with two SpaceMice, whose order in the list changes."""
+
+    def __init__(self):
+        self.caps = {b"/dev/hidraw3": PlayedHid(), b"/dev/hidraw5": PlayedHid()}
+
+    def enumerate(self):
+        known = next(iter(self.caps.values())).enumerate()[-1]
+        return [{**known, "path": path} for path, cap in reversed(self.caps.items()) if cap.plugged]
+
+    def device(self):
+        return copy(self)
+
+    def open_path(self, path):
+        self.read = self.caps[path].read
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def mice(monkeypatch, clock):
+    module = TwoHids()
+    monkeypatch.setitem(sys.modules, "hid", module)
+    made = SpaceMice(clock=clock)
+    made.open()
+    return made, list(module.caps.values())
+
+
+def test_two_caps_are_two_hands(mice):
+    made, caps = mice
+    table = load_map("spacemouse", CONTROLS["spacemouse"], hands=2)
+    (moves, *_) = table.banks(Steered(True, False, hands=True))
+    for cap, axis in zip(caps, ("one.vx", "two.vx"), strict=True):
+        cap.reports = [FORWARD_CAP]
+        meant = table.meant(made.read(), (), moves).deflections
+        assert meant[axis] == 1.0
+        cap.reports = [bytes.fromhex("01000000000000")]
+        made.read()
+
+
+@pytest.mark.parametrize("silent", [0, 1])
+def test_one_cap_that_falls_silent_or_is_gone_is_doubt_of_both(mice, clock, silent):
+    made, caps = mice
+    caps[silent].reports = [FORWARD_CAP]
+    began = clock.now
+    assert made.read().attended
+    clock.now += 0.2
+    caps[1 - silent].reports = [FORWARD_CAP]
+    said = made.read()
+    assert not said.attended
+    assert said.time == began
+    caps[silent].plugged = False
+    with pytest.raises(OSError, match="read error"):
+        made.read()
