@@ -149,8 +149,10 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
 def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:
     """Return the modes that a person can change to, by name: all for the robot, and that of the settings."""
     fit = fitting(MODES, len(env.model.description.hands))
-    modes = (build_mode(replace(config, mode=name, mask=""), env.model) for name in fit)
-    return {mode.name: mode for mode in (build_mode(config, env.model), *modes)}
+    modes = [build_mode(replace(config, mode=name, mask=""), env.model) for name in fit]
+    channels, hand = Channels.of(env.model.description), env.model.hand.name
+    known = [mode for mode in modes if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))]
+    return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
 
 
 def session_features(env: HandrailEnv) -> dict[str, Feature]:

@@ -129,10 +129,15 @@ class Channels:
         mask = np.zeros(self.size, dtype=bool)
         for name in names:
             chosen = self._groups.get(name, (name,))
-            if not chosen or not set(chosen) <= set(self.names):
+            if not self.have(name):
                 raise unknown_name("channel", name, (*self._groups, *self.names))
             mask |= [channel in chosen for channel in self.names]
         return mask
+
+    def have(self, *names: str) -> bool:
+        """Whether the robot has some channels, by name or by group."""
+        found = [self._groups.get(name, (name,)) for name in names]
+        return all(found) and all(set(each) <= set(self.names) for each in found)
 
 
 def _kind(name: str) -> str:

@@ -5,17 +5,19 @@ const NEAR = 60; // of a click to what it means [px]
 const STILL = 5; // that a pointer may move in a click [px]
 export const COLOURS = [0x00858c, 0x9333c8];
 
-// What parts of axes stand for: `ee` for what is steered, a hand or both as a pair; `one` and `two` for hands that are steered at once.
+// What parts of axes stand for: `ee` for what is steered, a hand or both as a pair; `one` and `two` for hands that are steered at once;
+// `lone` for the only joint that is steered beside a hand, such as a torso's.
 export function partsOf(channels, hands, active) {
   if (hands.length < 2) return {};
   const owns = (part) => channels.some((name) => name.startsWith(`${part}.`)), owned = hands.filter(owns);
   const ee = owned.includes(hands[active]) ? hands[active] : owned[0] ?? (owns("pair") ? "pair" : hands[active]);
-  return owned.length > 1 ? { ee, one: hands[0], two: hands[1] } : { ee };
+  const joints = channels.filter((name) => name.startsWith("joint.")), lone = owned.length && joints.length === 1 ? { lone: joints[0] } : {};
+  return owned.length > 1 ? { ee, one: hands[0], two: hands[1], ...lone } : { ee, ...lone };
 }
 
 // The same channels by the names of axes, beside their own.
 export function named(channels, parts) {
-  const others = Object.entries(parts).flatMap(([axis, part]) => channels.filter((name) => name.startsWith(`${part}.`)).map((name) => name.replace(part, axis)));
+  const others = Object.entries(parts).flatMap(([axis, part]) => part.includes(".") ? [`${axis}.v`] : channels.filter((name) => name.startsWith(`${part}.`)).map((name) => name.replace(part, axis)));
   return [...channels, ...others];
 }
 

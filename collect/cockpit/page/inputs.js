@@ -95,7 +95,8 @@ export class Inputs {
   // The channel that an axis of keys and sticks is now.
   channelOf(axis) {
     const [part, way] = axis.split(".");
-    return part in this.parts ? `${this.parts[part]}.${way}` : axis;
+    if (!(part in this.parts)) return axis;
+    return this.parts[part].includes(".") ? this.parts[part] : `${this.parts[part]}.${way}`;
   }
 
   flipGrip(hand) {

@@ -29,6 +29,7 @@ const SECOND = [ // of two hands that are steered at once; the first one has the
   ["KeyI", "two.vx", 1], ["KeyK", "two.vx", -1], ["KeyJ", "two.vy", 1], ["KeyL", "two.vy", -1], ["KeyU", "two.vz", 1], ["KeyO", "two.vz", -1],
 ];
 const APART = [["Digit0", "apart.v", 1], ["Digit9", "apart.v", -1]];
+const LONE = [["Period", "lone.v", 1], ["Comma", "lone.v", -1]]; // of a joint that is steered beside a hand
 const BELOW = ["KeyZ", "KeyX", "KeyC", "KeyV", "KeyB", "KeyN", "KeyM"];
 
 // What is done once: its words, its key, its button on a gamepad (of the standard layout; -1: none).
@@ -90,7 +91,7 @@ export function defaultKeys(stage) {
   const arm = stage.joints.slice(stage.base, stage.base + BELOW.length);
   const joints = arm.flatMap((name, index) => [[`Digit${index + 1}`, `joint.${name}`, 1], [BELOW[index], `joint.${name}`, -1]]);
   const first = HAND.slice(0, SECOND.length).map(([code, axis, sign]) => [code, axis.replace("ee", "one"), sign]);
-  return [...HAND, ...BASE, ...joints, ...(stage.hands.length > 1 ? [...first, ...SECOND, ...APART] : [])];
+  return [...HAND, ...BASE, ...joints, ...(stage.hands.length > 1 ? [...first, ...SECOND, ...APART, ...LONE] : [])];
 }
 
 export const BY_JOINTS = "base by its joints"; // owned: keys and sticks of the base mean its joints
@@ -116,7 +117,7 @@ function banks(owned, turns) {
   const fours = arm.flatMap((_, index) => (index % 4 ? [] : [arm.slice(index, index + 4).map((axis, each) => [each, axis, 1])]));
   const isHand = [...owned].some((name) => name.startsWith("ee.")), isBase = owned.has("base.vx") || owned.has(BY_JOINTS);
   if (owned.has("two.vx")) return [turns ? STICKS.hands_turn : STICKS.hands, ...fours];
-  if (isHand) return [turns ? [...STICKS.turn, ...STICKS.apart] : isBase ? STICKS.both : STICKS.hand, ...fours];
+  if (isHand) return [turns ? [...STICKS.turn, ...STICKS.apart, [3, "lone.v", -1]] : isBase ? STICKS.both : STICKS.hand, ...fours];
   return [...fours, ...(isBase || !arm.length ? [STICKS.base] : [])];
 }
 

@@ -179,6 +179,15 @@ def test_a_pair_is_steered_as_one_hand_and_parted(two):
     assert made.holds("9", "apart.v").values[apart] < 0.0
 
 
+def test_a_torso_beside_a_hand_has_keys_and_a_stick(two):
+    made = two("hand+torso", TwoSticks, Pad.SCRIPT)
+    for key, sign in (("Period", 1.0), ("Comma", -1.0)):
+        torso = made.moves(lambda key=key: made.driver.hold({key}), "joint.torso_lift_joint")
+        assert np.sign(torso.values.sum()) == sign
+        made.moves(made.rest)
+    made.sticks([0, 0, 0, -1], True, "joint.torso_lift_joint")
+
+
 def test_two_sticks_of_a_gamepad_are_two_hands_and_its_triggers_close_grippers(two):
     made = two("both", TwoSticks, Pad.SCRIPT)
     pad = Pad(made.driver)

@@ -13,7 +13,7 @@ from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Input
 from handrail.collect.operators.person.meaning import Setting
 from handrail.collect.operators.person.person import Person
-from handrail.collect.session.build import build_controller, build_env, build_session
+from handrail.collect.session.build import build_controller, build_env, build_modes, build_session
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 from handrail.controllers.registry import fitting
@@ -63,6 +63,14 @@ def test_only_the_active_hand_moves_and_the_recording_says_which():
         assert steering.moved() == {f"{hand}.vx"}
         assert np.array_equal(intent.mask, steering.person.meaning.channels.mask(hand))
         assert intent.raw.switches == switches
+
+
+def test_a_mode_of_channels_that_a_robot_lacks_is_no_choice():
+    """Two SO-101 arms share no torso: the mode that owns it would end the episode of who chose it."""
+    modes = build_modes(SessionConfig(), build_env(SessionConfig(robot="bi_so101"), 20))
+    assert {"both", "pair"} < modes.keys()
+    assert "hand+torso" not in modes
+    assert "hand+torso" in build_modes(SessionConfig(), build_env(SessionConfig(robot=TIAGO), 20))
 
 
 def test_a_hand_that_there_is_not_changes_nothing():
