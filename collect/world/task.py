@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 from handrail.collect.world.scene import FrozenArrays, Scene, SceneObject
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.robot.inverse_kinematics import hands_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _AWAY = 0.08  # [m]
+_OPEN = 0.8  # share of the stroke from which a gripper is open
 _LAID_OUT = 1.49  # of the tool ahead of the base's centre at home [m]
 
 
@@ -50,6 +52,11 @@ class TaskState:
         return self.tools[self.hand]
 
     @property
+    def pair(self) -> Pose:
+        """Half-way between the tool points, turned as the hand that does the task."""
+        return Pose(np.mean([tool.position for tool in self.tools], axis=0), self.tool.rotation)
+
+    @property
     def opening(self) -> float:
         """How far that hand's gripper is open."""
         return self.openings[self.hand]
@@ -64,10 +71,28 @@ class TaskState:
         """What the robot must not touch, where it is now."""
         return self.start.scene.obstacles(self.time)
 
-    def let_go(self, place: FloatArray) -> bool:
-        """Return whether the gripper is open, and the tool point away from a place, (3,): by 8 cm · scale."""
-        away = float(np.linalg.norm(self.tool.position - place))
-        return away >= _AWAY * self.scale and self.opening > 0.8
+    def left_alone(self, held: Pose, middle: FloatArray, apart: float) -> bool:
+        """Return whether two hands let go of a thing that they held so far apart along its y.
+
+        Args:
+            held: where the thing is.
+            middle: half-way between the places to hold it, in its frame [m], (3,).
+            apart: between those [m].
+        """
+        ways = [middle + [0.0, side * apart / 2, 0.0] for side in (1.0, -1.0)]
+        places = [held.position + held.rotation @ way for way in ways]
+        return all(self.let_go(place, hand) for place in places for hand in range(len(self.tools)))
+
+    def let_go(self, place: FloatArray, hand: int | None = None) -> bool:
+        """Return whether the gripper is open, and the tool point away from a place, (3,): by 8 cm · scale.
+
+        Args:
+            place: where it held [m].
+            hand: which of the hands; that does the task by default.
+        """
+        hand = self.hand if hand is None else hand
+        away = float(np.linalg.norm(self.tools[hand].position - place))
+        return away >= _AWAY * self.scale and self.openings[hand] > _OPEN
 
     def pose(self, name: str) -> Pose:
         """Return where an object is."""
@@ -168,6 +193,21 @@ def reach_share(model: RobotModel) -> float:
     home = model.description.home
     away = model.pose(home).position[:2] - model.pose(home, "planar_base").position[:2]
     return min(1.0, float(np.linalg.norm(away)) / _LAID_OUT)
+
+
+def side_by_side(model: RobotModel, q: FloatArray, middle: Pose, apart: float) -> tuple[FloatArray, float]:
+    """Return q with two hands beside a pose, each on the side along its y where it is, and the error left.
+
+    Args:
+        model: of the robot.
+        q: to begin with, (n,).
+        middle: half-way between the hands, turned as both.
+        apart: distance between them [m].
+    """
+    y, hands = middle.rotation[:, 1], model.description.hands
+    sides = [np.sign((model.pose(q, hand.named("tool")).position - middle.position) @ y) for hand in hands]
+    goals = [Pose(middle.position + 0.5 * apart * side * y, middle.rotation) for side in sides]
+    return hands_configuration(model, q, goals)
 
 
 def hand_rotation(x: ArrayLike, z: ArrayLike) -> FloatArray:

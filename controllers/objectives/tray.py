@@ -20,7 +20,7 @@ def tray_levelling(
     level: float = 2.0,
     slip: float = 0.5,
     friction: float = 0.2,
-    hand: int = 0,
+    hands: tuple[int, ...] = (0,),
 ) -> Objective:
     """Keep a tray level and what stands on it in place.
 
@@ -35,20 +35,22 @@ def tray_levelling(
         level: weight of the tilt [1/rad²].
         slip: weight of the tangential acceleration beyond the cone [s⁴/m²].
         friction: μ.
-        hand: that carries it.
+        hands: that carry it; of several, their mean.
     """
     axis = np.array(up, dtype=float) / np.linalg.norm(up)
 
     def residual(stage: Stage, p: ca.SX) -> ca.SX:
-        normal = stage.tool(hand).rotation @ axis
-        force = acceleration(stage, hand) + ca.DM([0.0, 0.0, GRAVITY])
+        share = 1.0 / len(hands)
+        normal = share * sum(stage.tool(hand).rotation @ axis for hand in hands)
+        force = share * sum(acceleration(stage, hand) for hand in hands) + ca.DM([0.0, 0.0, GRAVITY])
         pressing = ca.dot(force, normal)
         sliding = force - pressing * normal
         beyond = _hinge(1.0 - friction * pressing / _norm(sliding, _WIDTH), _SHARPNESS)
         return ca.vertcat(normal - ca.DM([0.0, 0.0, 1.0]), (_INSIDE + beyond) * sliding)
 
     def weights(mask: BoolArray) -> FloatArray:
-        tool, free = channels.twist_mask(mask, hand), leaves_hand(channels, mask, hand)
+        tool = channels.twist_mask(mask, hands[0])
+        free = leaves_hand(channels, mask, hands[0])
         tilts = free and not tool[3:5].any()
         slips = leaves_freedom(channels, mask) and not tool[:3].all()
         return np.repeat([level * tilts, slip * slips], 3)

@@ -1,5 +1,6 @@
 """Inverse kinematics of the arm, the base standing still: which joints put the tool where it shall be."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -31,6 +32,17 @@ def body_configuration(
 ) -> tuple[FloatArray, float]:
     """Return the same with a base that moves too: where it would stand, and the arm there, (n,)."""
     return _configuration(model, q, goal, tolerance, 0)
+
+
+def hands_configuration(model: RobotModel, q: FloatArray, goals: Sequence[Pose]) -> tuple[FloatArray, float]:
+    """Return the same with every hand at its own goal, by the joints that move it alone, (n,)."""
+    q, description = np.array(q, dtype=np.float64), model.description
+    first = 1 + int(np.flatnonzero(np.sum(description.moves, axis=0) > 1)[-1])
+    errors = []
+    for hand, goal in zip(description.hands, goals, strict=True):
+        q, error = _configuration(model.with_hand(hand.name), q, goal, 1e-4, first)
+        errors.append(error)
+    return q, max(errors)
 
 
 def _configuration(

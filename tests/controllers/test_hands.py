@@ -109,7 +109,7 @@ def test_a_pair_is_kept_as_it_begins_while_the_base_drives(mpc):
     driven.steer(("right",), [0.0, 0.05, 0.05, 0.0, 0.0, 0.0], 1.0)
     before = together_parameters(MODEL, driven.state.q)
     driven.steer(("pair",), AHEAD, 2.0)
-    driven.steer(("base", "pair"), [0.05, 0.03, 0.05, *[0.0] * 6], 2.0)
+    driven.steer(("base", "pair"), [-0.05, 0.03, 0.05, *[0.0] * 6], 2.0)
     after = together_parameters(MODEL, driven.state.q)
     turn = Rotation.from_matrix(after[3:].reshape(3, 3) @ before[3:].reshape(3, 3).T)
     assert np.linalg.norm(after[:3] - before[:3]) < 5e-3
@@ -135,7 +135,7 @@ def test_rows_take_their_own_arm_first():
 def test_objectives_are_of_a_hand():
     hold, tray = (
         end_effector_hold(CHANNELS, hand=1),
-        tray_levelling(CHANNELS, np.array([0.0, 0.0, 1.0]), hand=1),
+        tray_levelling(CHANNELS, np.array([0.0, 0.0, 1.0]), hands=(1,)),
     )
     assert hold.name == "right.hold"
     assert hold.weights(CHANNELS.mask("left")).any()

@@ -2,11 +2,12 @@
 
 import math
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.scripted.steering import MotionGoal, Target, hand_errors, length
+from handrail.collect.operators.scripted.steering import MotionGoal, hand_errors, length
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_vector
 from handrail.controllers.robot.model import Pose
@@ -63,11 +64,9 @@ class Perception:
         if target is not None:
             way = _off(hand_errors(tool, target.hand), hand, 3)
             seen = Pose(tool.position + way[:3], matrix_from_vector(way[3:]) @ tool.rotation)
-            target = Target(
-                seen, target.base, target.distance, target.angle, target.pace, target.tilt, target.hand
-            )
+            target = replace(target, hand=seen, meant=target.hand)
         hand, base = _off(goal.hand, hand, 3), _off(goal.base, base, 2)
-        return MotionGoal(hand, base, goal.focus, goal.gripper, target)
+        return replace(goal, hand=hand, base=base, target=target)
 
 
 def _off(vector: FloatArray, share: FloatArray, lengths: int) -> FloatArray:

@@ -8,7 +8,14 @@ from handrail.collect.operators.modes import Focus, TeleopMode
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.placement import straight_solution
-from handrail.collect.operators.scripted.steering import FOLLOW, Gains, MotionGoal, Target, hand_errors
+from handrail.collect.operators.scripted.steering import (
+    FOLLOW,
+    Gains,
+    MotionGoal,
+    Target,
+    hand_errors,
+    hand_twist,
+)
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
@@ -90,7 +97,7 @@ class InputMap(ABC):
 
     def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
         self.mode = mode
-        self._masks: dict[Focus, BoolArray] = {}
+        self._masks: dict[tuple[Focus, int | None], BoolArray] = {}
         self.channels = Channels.of(model.description)
         self._model, self._gains = model, gains
         self._base = len(self.channels.base)
@@ -133,40 +140,58 @@ class StickMap(InputMap):
         if self.mask("hand")[self.channels.joint_slice].any():
             self._turn = LargeTurn(self._model, self._gains, view)
 
-    def mask(self, focus: Focus) -> BoolArray:
-        """Return the channels that the operator owns, (m,)."""
-        if focus not in self._masks:
-            self._masks[focus] = self.channels.mask(*self.mode.owned(focus, self._model.hand.name))
-        return self._masks[focus]
+    def mask(self, focus: Focus, hand: int | None = None) -> BoolArray:
+        """Return the channels that the operator owns, (m,), where they attend to a hand."""
+        if (focus, hand) not in self._masks:
+            meant = self._model.hand if hand is None else self._model.description.hands[hand]
+            self._masks[focus, hand] = self.channels.mask(*self.mode.owned(focus, meant.name))
+        return self._masks[focus, hand]
 
     def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask, and the goal on every channel of the mode, within full stick, (m,)."""
-        mask = self.mask(goal.focus)
+        mask = self.mask(goal.focus, goal.hand_number)
         values = np.zeros(self.channels.size)
         values[self.channels.base_slice] = goal.base[: self._base]
-        values[self.channels.hand_slice(self._model.number)] = goal.hand
+        for hand, twist in self._twists(goal, state.q).items():
+            values[self.channels.hand_slice(hand)] = twist
         if self.channels.pair:  # whoever steers both moves them as they would move the one
             values[self.channels.pair_slice][:6] = goal.hand
         if mask[self.channels.joint_slice].any():
             values[self.channels.joint_slice] = self._joint_velocities(goal, state.q)
         return mask, np.minimum(np.maximum(np.where(mask, values, 0.0), -self.full), self.full)
 
+    def _twists(self, goal: MotionGoal, q: FloatArray) -> dict[int, FloatArray]:
+        """Return what is wanted of hands, by number: of each of a pair what brings it to its own place.
+
+        A task of several hands wants the others to stay where they are.
+        """
+        target, hands = goal.target, self._model.description.hands
+        if target is not None and target.apart:
+            tools = [self._model.pose(q, hand.named("tool")) for hand in hands]
+            pairs = zip(tools, target.of_hands(tools), strict=True)
+            return dict(enumerate(hand_twist(tool, place, self._gains, target.pace) for tool, place in pairs))
+        if goal.hand_number is None:
+            return {self._model.number: goal.hand}
+        return {hand: goal.hand * (hand == goal.hand_number) for hand in range(len(hands))}
+
     def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return what the expert makes of a goal on all joints, (n,), within full stick."""
         base = turned(goal.base, q[2]) if self._base else np.zeros(0)
-        if goal.target is not None and self._turn.is_ahead(goal.target, q):
+        twists = self._twists(goal, q)
+        if goal.target is not None and len(twists) == 1 and self._turn.is_ahead(goal.target, q):
             arm = self._turn.arm_velocity(goal.target, q, goal.target.base[: self._base])
             return np.concatenate([base, arm])
-        return self._inner_kinematics(goal.hand, base, q)
+        return self._inner_kinematics(twists, base, q)
 
-    def _inner_kinematics(self, hand: FloatArray, base: FloatArray, q: FloatArray) -> FloatArray:
-        """Return the expert's inner inverse kinematics, (n,): the hand first, the base when it can."""
+    def _inner_kinematics(self, twists: dict[int, FloatArray], base: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the expert's inner inverse kinematics, (n,): the hands first, the base when it can."""
         size, home = self._model.size, self._model.description.home - q
         home[: self._base] = 0.0
         weights = np.full(size, _DAMPING) / self._model.description.limits.velocity
-        posture = _POSTURE * np.any(hand) * np.eye(size)[self._base :]
-        rows = [self._model.jacobian(q), np.diag(weights), posture]
-        targets = [hand, np.zeros(size), posture @ (_RETURN * home)]
+        posture = _POSTURE * np.any([*twists.values()]) * np.eye(size)[self._base :]
+        tools = (self._model.description.hands[hand].named("tool") for hand in twists)
+        rows = [*(self._model.jacobian(q, tool) for tool in tools), np.diag(weights), posture]
+        targets = [*twists.values(), np.zeros(size), posture @ (_RETURN * home)]
         if len(base):
             rows.append(_BASE_WEIGHT * np.eye(len(base), size))
             targets.append(_BASE_WEIGHT * base)

@@ -34,6 +34,7 @@ class ScriptPhase(Target):
     name: str = ""  # what it is, for whoever plans anew after it
     focus: Focus = "hand"  # which of the two ends the phase, and is steered in switching mode
     gripper: float = 0.0  # 0 open, 1 closed
+    grippers: tuple[float, ...] = ()  # of each hand, where they differ
     beside: float = 0.0  # `distance` across the tool's axis, where more is good enough there [m]
     dwell: float = 0.0  # time to wait, hands still, before the next phase [s]
     patience: float = np.inf  # time after which the operator goes on anyway [s]
@@ -50,9 +51,10 @@ class ScriptPhase(Target):
         if self.focus == "base":
             *way, turn = base_errors(view.state.q, self.base)
             return bool(np.hypot(*way) < self.distance and abs(turn) < self.angle)
-        distance, angle = pose_errors(view.tool, self.hand)
+        tool = self.steered(view.task)
+        distance, angle = pose_errors(tool, self.hand)
         if self.beside:
-            *across, along = view.tool.rotation.T @ (view.tool.position - self.hand.position)
+            *across, along = tool.rotation.T @ (tool.position - self.hand.position)
             distance = max(abs(along), np.hypot(*across) * self.distance / self.beside)
         return bool(distance < self.distance and angle < self.angle)
 
@@ -90,12 +92,15 @@ class PhasedScript(ABC):
     def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now, and go to the next phase when this one is done."""
         self._advance(view)
-        phase = self._phases[0]
+        phase, hands = self._phases[0], len(self._model.description.hands)
+        grippers = phase.grippers or (phase.gripper,) * (hands if phase.apart else 0)
         if self._reached_at is not None:
-            return MotionGoal.rest(phase.focus, phase.gripper)
-        hand = hand_twist(view.tool, phase.hand, self._gains, phase.pace)
+            rest = MotionGoal.rest(phase.focus, phase.gripper)
+            return replace(rest, grippers=grippers, hand_number=phase.hand_number)
+        hand = hand_twist(phase.steered(view.task), phase.hand, self._gains, phase.pace)
         base = base_twist(view.state.q, phase.base, self._gains)
-        return MotionGoal(hand, base, phase.focus, phase.gripper, phase)
+        said = phase.focus, phase.gripper, phase, grippers, phase.hand_number
+        return MotionGoal(hand, base, *said)
 
     def _advance(self, view: View) -> None:
         phase, time = self._phases[0], view.state.time

@@ -99,7 +99,9 @@ class ScriptedOperator:
     def act(self, view: View) -> Intent:
         """Return the intent now: the goal in this mode's channels, as the hand manages it."""
         time = view.state.time
-        goal = self._perception.see(self._script.motion_goal(view), view.tool, time)
+        goal = self._script.motion_goal(view)
+        tool = goal.target.steered(view.task) if goal.target else view.tool
+        goal = self._perception.see(goal, tool, time)
         mask, wanted = self._map.wanted(goal, view.state)
         self._switch(mask, time)
         moved = self._hand.move(np.zeros_like(wanted) if time < self.free_at else wanted, time)
@@ -107,7 +109,7 @@ class ScriptedOperator:
         values = np.where(mask, self._map.sent(moved, view.state), 0.0)
         raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
         hands = range(len(self._map.channels.hands))
-        grippers = tuple(goal.gripper if hand == view.task.hand else 0.0 for hand in hands)
+        grippers = goal.grippers or tuple(goal.gripper if hand == view.task.hand else 0.0 for hand in hands)
         return Intent(values, mask, grippers, self._mode.name, time, raw=raw)
 
     def _switch(self, mask: BoolArray, time: float) -> None:

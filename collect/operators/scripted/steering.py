@@ -1,12 +1,14 @@
 """What an operator wants, whatever the teleop mode, and how far they push the stick towards it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from handrail.collect.operators.modes import Focus
+from handrail.collect.world.task import TaskState
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.numerics.rotation import rotation_vector, turned
 from handrail.controllers.robot.model import Pose
@@ -26,8 +28,24 @@ class Target:
     angle: float = 0.2  # the same for orientation [rad]
     pace: float = 1.0  # share of the full stick
     tilt: float = np.inf  # how far the hand may lean from the pose's axis on the way there [rad]
+    hand_number: int | None = None  # which hand is steered there; None: that does the task
+    apart: float = 0.0
+    """Between two hands that are steered as a pair, along their common y [m], where the pose is half-way; 0:
+    one is steered."""
     meant: Pose | None = None
     """The pose itself where `hand` is as somebody sees it, who misjudges; None where it is the same."""
+
+    def steered(self, task: TaskState) -> Pose:
+        """Return where what is steered is now: a hand's tool, or what is half-way between two."""
+        if self.apart:
+            return task.pair
+        return task.tool if self.hand_number is None else task.tools[self.hand_number]
+
+    def of_hands(self, tools: Sequence[Pose]) -> list[Pose]:
+        """Return where the hands of a pair belong, on the sides where their tools are now."""
+        pose, order = self.hand, np.sign((tools[0].position - tools[1].position) @ self.hand.rotation[:, 1])
+        ways = (0.5 * self.apart * order * side * pose.rotation[:, 1] for side in (1.0, -1.0))
+        return [Pose(pose.position + way, pose.rotation) for way in ways]
 
     @property
     def identity(self) -> bytes:
@@ -45,6 +63,8 @@ class MotionGoal:
     focus: Focus = "hand"  # which of the two matters now
     gripper: float = 0.0  # 0 open, 1 closed
     target: Target | None = None  # where that leads; None wants to rest
+    grippers: tuple[float, ...] = ()  # of each hand, where a task is of several; then `gripper` means nothing
+    hand_number: int | None = None  # which hand they attend to; None: that does the task
 
     @classmethod
     def rest(cls, focus: Focus = "hand", gripper: float = 0.0) -> "MotionGoal":

@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase
 from handrail.collect.world.task import reach_share
-from handrail.collect.world.tasks.tray import HANDLE
+from handrail.collect.world.tasks.tray import APART, HANDLE
 from handrail.controllers.robot.model import Pose
 
 _OVER = 0.10  # the tray above the table while it comes near [m]
@@ -27,7 +27,8 @@ class TrayScript(PhasedScript):
         place = np.array([table.front + _INSIDE, table.position[1], table.top + HANDLE[2] + _ABOVE])
         stand = route.stand(place, table.front)
         over, up = (place + np.array([0.0, 0.0, rise]) for rise in (_OVER, _OVER + 0.08))
-        at = partial(ScriptPhase.at, rotation=_DOWN, base=stand)
+        apart = APART if len(view.task.start.grip) > 1 else 0.0
+        at = partial(ScriptPhase.at, rotation=_DOWN, base=stand, apart=apart)
         phases = [
             at("over", over, distance=0.02, angle=0.15, pace=0.7, tilt=_TILT, gripper=1.0),
             at("lower", place, distance=0.012, angle=3.2, pace=0.25, tilt=_TILT, patience=8.0, gripper=1.0),
@@ -39,5 +40,6 @@ class TrayScript(PhasedScript):
         height = max(view.tool.position[2], place[2] + _OVER)
         crossing = np.array([route.lane + _AHEAD * reach_share(self._model), place[1], height])
         lane = np.array([route.lane, place[1], 0.0])
-        cross = ScriptPhase.at("cross", crossing, _DOWN, lane, gripper=1.0, distance=0.12, angle=0.4)
+        near = {"gripper": 1.0, "distance": 0.12, "angle": 0.4, "apart": apart}
+        cross = ScriptPhase.at("cross", crossing, _DOWN, lane, **near)
         return [cross, *phases]

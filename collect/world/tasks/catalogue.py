@@ -25,6 +25,11 @@ class TaskSpec:
 
 
 _TASKS, _SCRIPTS = "handrail.collect.world.tasks", "handrail.collect.operators.scripted"
+_TRAY = f"{_TASKS}.tray"
+_LEVEL: dict[str, Any] = {
+    "released_channels": ("ee.wx", "ee.wy"),  # its tilt is the MPC's
+    "owned_channels": ("ee.vz",),  # who drives with it in hand minds how high it is
+}
 
 
 def _spec(name: str, task: str, help: str, **options: Any) -> TaskSpec:
@@ -36,16 +41,19 @@ TASKS = Registry(
     "task",
     TaskSpec,
     (
+        _spec("carry_box", "CarryBox", "carry a box with both hands", hands=2),
         _spec("drawer", "Drawer", "pull it open"),
         _spec("pick_place", "PickPlace", "carry a cube into a bin"),
         _spec("reach", "Reach", "bring the hand to a pose", movers=True),
-        _spec(
-            "tray",
-            "Tray",
-            "carry a tray with a can on it",
-            objectives=f"{_TASKS}.tray:level_tray",
-            released_channels=("ee.wx", "ee.wy"),  # its tilt is the MPC's
-            owned_channels=("ee.vz",),  # who drives with it in hand minds how high it is
+        _spec("tray", "Tray", "carry a tray with a can on it", objectives=f"{_TRAY}:level_tray", **_LEVEL),
+        TaskSpec(
+            "wide_tray",
+            f"{_TRAY}:WideTray",
+            f"{_SCRIPTS}.tray:TrayScript",
+            "carry a tray with both hands",
+            objectives=f"{_TRAY}:level_wide_tray",
+            hands=2,
+            **_LEVEL,
         ),
     ),
 )

@@ -23,7 +23,8 @@ _CONE: Colour = (0.90, 0.45, 0.10, 1.0)
 _CRATE: Colour = (0.55, 0.58, 0.36, 1.0)
 _TRAY: Colour = (0.30, 0.55, 0.42, 1.0)
 
-TRAY_BAR = 0.03  # width and height of a tray's handle [m]
+BAR = 0.03  # width and height of a handle [m]
+BAR_LENGTH = 0.11  # of the handle at a side [m]
 SIDES = (-1.0, 1.0)
 _MOST_OBSTACLES = 3
 _PREFIX = "obstacle"
@@ -102,7 +103,7 @@ def tray(
         mass: [kg].
     """
     length, width, height = size
-    thick, rim, bar = 0.01, 0.012, TRAY_BAR
+    thick, rim, bar = 0.01, 0.012, BAR
     x, y = length / 2 - thick / 2, width / 2 - thick / 2
     parts = [block((length, width, thick), [0.0, 0.0, -thick / 2])]
     for side in SIDES:
@@ -115,6 +116,32 @@ def tray(
     return SceneObject(
         name, shape, position, rotation, rgba=_TRAY, mass=mass, parts=tuple(parts), friction=0.35
     )
+
+
+def crate(
+    name: str, x: float, y: float, bottom: float, yaw: float, size: tuple[float, float, float], mass: float
+) -> SceneObject:
+    """Return an open box with a bar that sticks out on either side, along its y, to be lifted by both.
+
+    Args:
+        name: unique in the scene.
+        x: of its centre [m].
+        y: likewise [m].
+        bottom: height that it stands at [m].
+        yaw: how it is turned [rad].
+        size: its lengths without the bars [m].
+        mass: [kg].
+    """
+    length, width, height = size
+    thick, at = 0.012, height / 2 - BAR / 2
+    parts = [block((length, width, thick), [0.0, 0.0, (thick - height) / 2])]
+    for side in SIDES:
+        parts.append(block((thick, width, height), [side * (length - thick) / 2, 0.0, 0.0]))
+        parts.append(block((length, thick, height), [0.0, side * (width - thick) / 2, 0.0]))
+        parts.append(block((BAR, BAR_LENGTH, BAR), [0.0, side * (width + BAR_LENGTH) / 2, at], STEEL))
+    shape = box([length, width + 2 * BAR_LENGTH, height])
+    looks = {"rgba": _CRATE, "parts": tuple(parts)}
+    return standing(name, shape, x, y, bottom, yaw, mass=mass, friction=0.8, **looks)
 
 
 def can(name: str, position: FloatArray, radius: float, height: float, mass: float) -> SceneObject:

@@ -1,6 +1,7 @@
 """Carry an open tray with a loose can on it past obstacles on the floor, and put it down on a table."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from handrail.collect.world.task import (
     check_large,
     hand_rotation,
     reach_share,
+    side_by_side,
 )
 from handrail.collect.world.tasks.furniture import (
-    TRAY_BAR,
+    BAR,
     can,
     obstacle_features,
     obstacle_names,
@@ -33,13 +35,19 @@ from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 
-_SIZE = (0.26, 0.32, 0.20)  # of the tray: length, width, handle above the plate [m]
+_HIGH = 0.20  # of the handle above the plate [m]
+_SIZES = (
+    (0.26, 0.32, _HIGH),
+    (0.26, 0.56, _HIGH),
+)  # of a tray for one hand, and for two: length, width, handle [m]
+_TABLES = 0.7, 0.9  # width of the table for either [m]
 _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
 _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
 _MOST_TRIES = 20  # starts drawn, until the arm can hold the tray there
 _VIEW = Viewpoint(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
 _LEVEL = 20.0  # weight of its tilt
-HANDLE = np.array([0.0, 0.0, _SIZE[2]])  # centre of the handle's bar in the tray's frame [m]
+APART = 0.40  # between two hands that hold it [m]
+HANDLE = np.array([0.0, 0.0, _HIGH])  # centre of the handle's bar in the tray's frame [m]
 
 
 @dataclass(frozen=True)
@@ -54,6 +62,11 @@ class Tray(Task):
     horizon: float = 90.0  # time limit [s]
     clearance: float = 0.15
     """Between the robot's start and anything on the floor, and between obstacles [m]."""
+    hands: int = 1  # that hold it
+
+    @property
+    def _size(self) -> tuple[float, float, float]:
+        return _SIZES[self.hands - 1]
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -63,17 +76,17 @@ class Tray(Task):
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles."""
         check_large(model, "Tray")
+        model.description.check_hands("task Tray", self.hands)
         side = rng.choice([-1.0, 1.0])
         x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
-        goal = table("table", x, y, (0.6, 0.7, rng.uniform(0.55, 0.65)))
-        q = _sample_start(model, side, rng)
-        tool = model.pose(q)
+        goal = table("table", x, y, (0.6, _TABLES[self.hands - 1], rng.uniform(0.55, 0.65)))
+        q, tool = _sample_start(model, side, rng, self.hands)
         level = tool.rotation @ np.diag(
             [1.0, -1.0, -1.0]
         )  # under a hand that points down, the bar along its y
-        held = tray("tray", tool.position, level, _SIZE, _TRAY_MASS)
+        held = tray("tray", tool.position, level, self._size, _TRAY_MASS * self.hands)
         objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
-        return Start(Scene(objects, _VIEW), q, grip=(TRAY_BAR,))
+        return Start(Scene(objects, _VIEW), q, grip=(BAR,) * self.hands)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (29,)."""
@@ -90,28 +103,34 @@ class Tray(Task):
         held, goal = state.pose("tray"), state.object("table")
         if held.position[2] < goal.top - 0.05 or held.rotation[2, 2] < np.cos(0.8):
             return Verdict(failure="tray_dropped")
-        if not _stands_on(held, state.pose("can")):
+        if not self._stands_on(held, state.pose("can")):
             return Verdict(failure="can_fell")
         inside = np.abs(held.position[:2] - goal.position[:2]) < goal.shape.size[:2] / 2
         down = held.position[2] < goal.top + 0.02 and "tray" in state.still and inside.all()
+        if self.hands > 1:
+            return Verdict(success=bool(down) and state.left_alone(held, HANDLE, APART))
         return Verdict(success=bool(down) and state.let_go(held.position + held.rotation @ HANDLE))
 
+    def _stands_on(self, held: Pose, thing: Pose) -> bool:
+        """Return whether the can stands upright on the tray."""
+        local = held.rotation.T @ (thing.position - held.position)
+        inside = np.all(np.abs(local[:2]) < np.array(self._size[:2]) / 2) and 0.0 < local[2] < _HEIGHT
+        return bool(inside) and float(held.rotation[:, 2] @ thing.rotation[:, 2]) > np.cos(0.8)
 
-def _stands_on(held: Pose, thing: Pose) -> bool:
-    """Return whether the can stands upright on the tray."""
-    local = held.rotation.T @ (thing.position - held.position)
-    inside = np.all(np.abs(local[:2]) < np.array(_SIZE[:2]) / 2) and 0.0 < local[2] < _HEIGHT
-    return bool(inside) and float(held.rotation[:, 2] @ thing.rotation[:, 2]) > np.cos(0.8)
+
+WideTray = partial(Tray, hands=2)
 
 
-def _sample_start(model: RobotModel, side: float, rng: np.random.Generator) -> FloatArray:
-    """Return a start on the far side, the hand pointing down ahead of the base."""
+def _sample_start(
+    model: RobotModel, side: float, rng: np.random.Generator, hands: int
+) -> tuple[FloatArray, Pose]:
+    """Return a start on the far side, hands pointing down ahead of the base, and where they hold the tray."""
     place = np.zeros(3)
     for _ in range(_MOST_TRIES):
         q, hand = _draw_start(model, side, rng)
-        q, error = arm_configuration(model, q, hand)
+        q, error = side_by_side(model, q, hand, APART) if hands > 1 else arm_configuration(model, q, hand)
         if error <= 1e-3:
-            return q
+            return q, hand if hands > 1 else model.pose(q)
         place = hand.position
     raise HandrailError(
         f"task Tray: expected a robot that reaches places such as {place.round(2).tolist()} from above, "
@@ -139,4 +158,13 @@ def _sample_can(on: SceneObject, rng: np.random.Generator) -> SceneObject:
 
 def level_tray(channels: Channels, hand: int) -> tuple[Objective, ...]:
     """Return what the masked MPC minds while the operator carries the tray: that it is level."""
-    return (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=_LEVEL, hand=hand),)
+    return _levelling(channels, hand)
+
+
+def level_wide_tray(channels: Channels, hand: int) -> tuple[Objective, ...]:
+    """Return the same for a tray that two hands carry, whichever means the task."""
+    return _levelling(channels, 0, 1)
+
+
+def _levelling(channels: Channels, *hands: int) -> tuple[Objective, ...]:
+    return (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=_LEVEL, hands=hands),)
