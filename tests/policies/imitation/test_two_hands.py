@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from handrail.collect.world.observation import to_numbers
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.datasets.format.schema import Feature
+from handrail.policies.imitation.interface.checkpoint import MIXED, PolicyMeta, read_meta, write_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.steps import CompletedRobot, Completion
 
 TIAGO = load_description(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
 CHANNELS, JOINTS, N = Channels.of(TIAGO), TIAGO.joints, len(TIAGO.joints)
@@ -115,3 +120,33 @@ def test_each_hand_sees_a_thing_from_where_it_is():
         np.testing.assert_allclose(seen[1][f"goal.{hand}.dx"], goal - tool, rtol=1e-4, atol=1e-5)
         assert f"{hand}.gripper.opening" in seen[0]
     assert "obstacle_0.x" in seen[1]  # from the base alone
+
+
+def test_a_checkpoint_says_the_hand_and_of_one_hand_it_is_as_before(tmp_path):
+    for hand in ("", "right", MIXED):
+        origin = ("reach", "ee", "robot", 20, "realised", 0, 0, {}, "act", 1)
+        write_meta(tmp_path, PolicyMeta(interface_of(episode([("left",)]), "realised"), *origin, hand=hand))
+        assert read_meta(tmp_path).hand == hand
+        assert ('"hand"' in (tmp_path / "handrail.json").read_text()) == bool(hand)
+
+
+def test_intents_of_the_second_hand_are_completed_with_what_it_holds():
+    """As LeRobot's evaluation runs them: the robot comes along, each gripper is the policy's."""
+    model = load_model("bi_so101").with_hand("right")
+    channels, n = Channels.of(model.description), model.size
+    own = [(f"{hand}.gripper.opening", *(f"{hand}.tool.{part}" for part in POSE)) for hand in HANDS]
+    names = (*(f"{j}.{kind}" for kind in ("pos", "vel") for j in model.joints), *own[0], *own[1])
+    interface = PolicyInterface(
+        "intent", names, (), channels.names, (tuple(channels.mask("right").tolist()),)
+    )
+    robot = CompletedRobot(interface, Completion("bi_so101", "reach", "ee", 20, "right"))
+    state = np.concatenate([model.description.home, np.zeros(n), *[[1.0, 0, 0, 0, 1, 0, 0, 0]] * 2])
+    held = Obstacle("cube", Shape("box", np.full(3, 0.02)), np.zeros(3), np.eye(3), frame="right.tool")
+    around = to_numbers((held,), ("left.tool", "right.tool"))
+    action = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 1.0])
+    velocities = robot.velocities(action, state, np.zeros(1), np.zeros(n), around)
+    assert velocities.shape == (n + 2,)
+    assert velocities[-2:].tolist() == [0.0, 1.0]
+    right, left = (np.array(moves) for moves in model.description.moves[::-1])
+    assert np.abs(velocities[:n][right]).max() > 1e-3
+    assert np.abs(velocities[:n][left & ~right]).max() < np.abs(velocities[:n][right & ~left]).max()
