@@ -19,16 +19,15 @@ from handrail.datasets.format.manifest import Manifest, read_manifest
 from handrail.datasets.format.metadata import Totals
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.folder import check_folders, clear_staging, finish_clearing, quarantine
-from handrail.datasets.recording.quarantine import restore, without_damaged
+from handrail.datasets.recording.quarantine import without_damaged
 from handrail.datasets.recording.rewrite import settle
-from handrail.datasets.recording.survey import Survey, said_to_be_saved, shortened, survey
+from handrail.datasets.recording.survey import Survey, shortened, survey
 from handrail.datasets.storage.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
 
 REWRITTEN = "whole, but as another tool wrote them"  # a repair renews their checksums
 REMOVED = "leftovers removed"  # of an interrupted recording
 MOVED = "files of no episode moved to .damaged"
-RESTORED = "files moved back"
 REBUILT = "written anew"  # summary files
 
 
@@ -78,7 +77,6 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
         check_folders(layout)
         with DatasetLock(layout.staging):
             finish_clearing(layout)
-            restored = restore(layout, said_to_be_saved(layout))
             found = survey(layout, manifest, Checksums(layout.root, anew=True))
             done = _clear(found)
             for group in found.groups:
@@ -86,7 +84,6 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
                     row = layout.row(group.first)
                     replace(row, with_checksums(row, group.rewritten), layout.staging)
             counted = found.totals.episodes == found.episodes
-            done[RESTORED] = tuple(restored)
             done[REBUILT] = _rebuild(layout, manifest, found.totals) if counted else ()
             if found.damage and set_aside_damaged:
                 totals = without_damaged(found, manifest)

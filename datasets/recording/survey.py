@@ -90,7 +90,7 @@ def survey(layout: Layout, manifest: Manifest, sums: Checksums) -> Survey:
     """Look at everything, change nothing; remember the checksums."""
     rows = row_files(layout)
     streams = sorted((*layout.root.glob("videos/*/*/*.mp4"), *layout.root.glob("data/*/*.parquet")))
-    groups = _by_episode(rows)
+    groups = {number: path for path in rows if (number := episode_of(path)) is not None}
     numbered = {path: number for path in streams if (number := episode_of(path)) is not None}
     saved, counted = _end(groups), _saved_in_info(layout)
     inside = _inside(numbered, groups)
@@ -109,15 +109,6 @@ def survey(layout: Layout, manifest: Manifest, sums: Checksums) -> Survey:
     leftovers = tuple(path for path, number in numbered.items() if interrupted and number == saved)
     unknown = tuple(path for path in (*streams, *rows) if episode_of(path) is None or path in inside)
     return Survey(layout, states, totals, leftovers, unknown)
-
-
-def said_to_be_saved(layout: Layout) -> int:
-    """Return how many episodes there should be, by their rows of metadata and by `info.json`."""
-    return max(_end(_by_episode(row_files(layout))), _saved_in_info(layout) or 0)
-
-
-def _by_episode(rows: Sequence[Path]) -> dict[int, Path]:
-    return {number: path for path in rows if (number := episode_of(path)) is not None}
 
 
 def _inside(numbered: Mapping[Path, int], groups: Mapping[int, Path]) -> set[Path]:

@@ -24,7 +24,6 @@ from datasets_helpers import (
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.recording.folder import quarantine
 from handrail.datasets.recording.repair import MOVED, REBUILT, REMOVED, repair
 
 
@@ -104,24 +103,6 @@ def test_pictures_move_up_with_their_episode(root):
     moved = {key: dataset[length_of(1) + 2][key].mean().item() * 255 for key in CAMERAS}
     for place, key in enumerate(CAMERAS):
         assert moved[key] == pytest.approx(frame_of(2, 2, cameras=True)[CAMERAS[place]].mean(), abs=2.5)
-
-
-def test_an_older_repair_that_was_cut_short_is_undone(tmp_path):
-    """It moved everything from the damaged episode on into `.damaged/`, the lines last and from the end."""
-    original = record(tmp_path / "original", 4)
-    layout = Layout(original)
-    os.truncate(layout.data(1), 100)
-    before = tree(original)
-    del before["data/chunk-000/file-001.parquet"]  # it is not what its seal says, and stays in `.damaged/`
-    moved = [*(layout.data(number) for number in (1, 2, 3)), *(layout.row(number) for number in (3, 2, 1))]
-    for count in range(1, len(moved) + 1):
-        root = shutil.copytree(original, tmp_path / str(count))
-        quarantine(Layout(root), [root / layout.relative(path) for path in moved[:count]])
-        report = repair(root)
-        assert [fault.split(":")[0] for fault in report.damage] == ["episode 1"]
-        assert {name: content for name, content in tree(root).items() if name in before} == before
-        assert repair(root, set_aside_damaged=True).episodes == 3
-        check_is(root, [0, 2, 3])
 
 
 def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
