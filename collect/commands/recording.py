@@ -93,7 +93,11 @@ class Recording:
         return outcome
 
     def episodes(
-        self, writer: EpisodeWriter, wanted: int, note: Callable[[Outcome], None], first: int = 0
+        self,
+        writer: EpisodeWriter,
+        wanted: int,
+        note: Callable[[Outcome], None] = lambda outcome: None,
+        first: int = 0,
     ) -> Iterator[Outcome]:
         """Record until a dataset has so many episodes, or the operator quits; yield how each went.
 

@@ -1,4 +1,4 @@
-"""Records with several workers: each its own shards, episode by episode crash-safe; merged as they come.
+"""Records with several workers: each its own shards, episode by episode crash-safe; merged in the end.
 
 A shard is a dataset of a few episodes. All lie beside the dataset, in `.NAME.shards`, until they are whole
 and become one. Which episodes a shard has does not depend on who records it: whatever is cut short goes on
@@ -8,12 +8,10 @@ with any number of workers.
 import json
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
-from queue import SimpleQueue
 from typing import Any, Literal
 
 import pyarrow as pa
@@ -22,7 +20,7 @@ from handrail.collect.commands.account import RecordingLog
 from handrail.collect.commands.recording import Recording, open_writer
 from handrail.collect.config import RecordConfig
 from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.job import Job, Result
+from handrail.collect.execution.job import Job
 from handrail.collect.session.build import build_env
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import settings_json
@@ -34,7 +32,6 @@ from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.episode_rows import each_record
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
-from handrail.datasets.format.metadata import EpisodeRecord
 from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -112,27 +109,18 @@ class Shards:
 
         Nothing is encoded anew. Whoever calls has the sole right to write there.
         """
-        whole: SimpleQueue[Result | None] = SimpleQueue()
-        with explained(f"cannot write dataset {str(self.root)!r}"), ThreadPoolExecutor(1) as thread:
-            merge = thread.submit(self._merge, jobs, _in_order(jobs, whole))
-            try:
-                for result in execution.run(jobs):
-                    if result.error:
-                        raise HandrailError(
-                            f"{result.job.name}: {result.error}; what was recorded is kept in {self.folder},"
-                            " and the same flags go on"
-                        )
-                    for outcome in result.value[0]:
-                        log.add(outcome)
-                    execution.say(log.words)
-                    whole.put(result)
-                    if merge.done():  # not all are whole: it failed
-                        merge.result()
-                execution.say(f"{log.words}, merging")
-                merge.result()
-            except BaseException:
-                whole.put(None)
-                raise
+        for result in execution.run(jobs):
+            if result.error:
+                raise HandrailError(
+                    f"{result.job.name}: {result.error}; what was recorded is kept in {self.folder}, and the"
+                    " same flags go on"
+                )
+            for outcome in result.value:
+                log.add(outcome)
+            execution.say(log.words)
+        execution.say(f"{log.words}, merging")
+        with explained(f"cannot write dataset {str(self.root)!r}"):
+            self._merge(jobs)
 
     def remove(self) -> None:
         """Remove them; the plan first, so that nobody goes on with a part."""
@@ -160,66 +148,45 @@ class Shards:
             log=folder.with_suffix(".log"),
         )
 
-    def _merge(self, jobs: Sequence[Job], lines: Iterator[list[EpisodeRecord]]) -> None:
-        begin = next(lines)
+    def _merge(self, jobs: Sequence[Job]) -> None:
         roots = [self.root] * bool(self._plan.first) + [_folder(jobs[0])]
         sources = [EditSource.open(root) for root in roots]
-        manifest, shards = sources[0].manifest, zip(jobs, chain([begin], lines), strict=True)
-        new = chain.from_iterable(_slices(job, found, manifest) for job, found in shards)
-        slices = chain(sources[0].slices() if self._plan.first else (), new)
+        before = sources[0].slices() if self._plan.first else ()
+        new = chain.from_iterable(_slices(job, sources[0].manifest) for job in jobs)
         try:
-            copy_episodes(sources, self.root, slices, in_place=True)
+            copy_episodes(sources, self.root, chain(before, new), in_place=True)
         except (pa.ArrowException, ValueError, KeyError) as error:
             raise HandrailError(f"{str(self.folder)!r} cannot be read: {message_of(error)}") from error
-
-
-def _in_order(jobs: Sequence[Job], whole: "SimpleQueue[Result | None]") -> Iterator[list[EpisodeRecord]]:
-    """Yield the lines of metadata of every shard, in order, as they are recorded."""
-    found: dict[str, list[EpisodeRecord]] = {}
-    for job in jobs:
-        while job.name not in found:
-            result = whole.get()
-            if result is None:  # recording has ended
-                raise CancelledError
-            found[result.job.name] = result.value[1]
-        yield found.pop(job.name)  # some 50 kB an episode
 
 
 def _folder(job: Job) -> Path:
     return job.arguments[1]
 
 
-def _slices(job: Job, lines: Sequence[EpisodeRecord], manifest: Manifest) -> Iterator[EpisodeSlice]:
+def _slices(job: Job, manifest: Manifest) -> Iterator[EpisodeSlice]:
     """Yield the episodes of a shard."""
-    folder = _folder(job)
-    if len(lines) != job.size:
-        raise HandrailError(f"dataset {str(folder)!r}: expected {job.size} episodes, found {len(lines)}")
-    yield from (EpisodeSlice.of(Layout(folder), manifest, line) for line in lines)
+    layout = Layout(_folder(job))
+    records = list(each_record(layout, with_stats=True))
+    if len(records) != job.size:
+        raise HandrailError(
+            f"dataset {str(layout.root)!r}: expected {job.size} episodes, found {len(records)}"
+        )
+    yield from (EpisodeSlice.of(layout, manifest, record) for record in records)
 
 
-def record_shard(
-    config: RecordConfig, folder: Path, first: int, episodes: int
-) -> tuple[list[Outcome], list[EpisodeRecord]]:
-    """Record a part of a recording into a dataset of its own.
+def record_shard(config: RecordConfig, folder: Path, first: int, episodes: int) -> list[Outcome]:
+    """Record a part of a recording into a dataset of its own; return how those went that were not there yet.
 
     Args:
         config: of the whole recording.
         folder: of the part.
         first: number of its first episode in the whole.
         episodes: how many it has.
-
-    Returns:
-        How those went that were not there yet, and the lines of metadata of all.
     """
-    outcomes: list[Outcome] = []
     env, recording = _recording(config)
     own = replace(config, dataset=replace(config.dataset, place=str(folder), root=""))
     with _opened(own, folder, env) as writer:
-        lines = list(each_record(Layout(folder), with_stats=True))
-        for _ in recording.episodes(writer, episodes, outcomes.append, first):
-            assert writer.last
-            lines.append(writer.last)
-    return outcomes, lines
+        return list(recording.episodes(writer, episodes, first=first))
 
 
 def _opened(config: RecordConfig, folder: Path, env: HandrailEnv) -> EpisodeWriter:

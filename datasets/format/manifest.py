@@ -6,7 +6,6 @@ folder without it was not written by Handrail and is never written to.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
@@ -15,7 +14,7 @@ from msgspec import Meta
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import check_settings
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.schema import OUTCOME_PREFIX, Feature, check_features, features_of
+from handrail.datasets.format.schema import Feature, check_features, features_of
 from handrail.datasets.storage.strict_json import json_bytes, read_json
 
 FORMAT = 1
@@ -60,16 +59,6 @@ class Manifest:
         for thing, (theirs, ours) in things.items():
             if theirs != ours:
                 raise HandrailError(f"{refused}: {thing} of the existing episodes is {theirs}, got {ours}")
-
-    def check_continues(self, existing: "Manifest", root: Path) -> None:
-        """Check that episodes of this schema may follow those of an existing dataset."""
-        for key in self.features:
-            if key not in existing.features and key.startswith(OUTCOME_PREFIX):
-                raise HandrailError(
-                    f"cannot resume {str(root)!r}: an earlier version recorded it, without {key!r};"
-                    " choose another root (the episodes there can still be replayed, trained on and compared)"
-                )
-        self.check_fits(existing, f"--resume: cannot add to {str(root)!r}")
 
     def to_bytes(self) -> bytes:
         """Return the manifest as JSON."""

@@ -32,7 +32,6 @@ NUMBERS = (
 )
 DTYPES = (*NUMBERS, "string", "video")
 POLICY_PREFIXES = ("observation", "action")
-OUTCOME_PREFIX = "next."  # LeRobot's name for what came of a frame
 _LARGEST = 10**8  # numbers a frame and feature
 _LARGE = 1e38  # what float32 holds
 _can_become = cache(np.can_cast)

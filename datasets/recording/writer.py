@@ -76,8 +76,6 @@ class EpisodeWriter:
         """The columns that each frame must have."""
         self.repaired = repaired
         """What `resume` put in order."""
-        self.last: EpisodeRecord | None = None
-        """The row of metadata of the episode that this writer saved last."""
 
     @classmethod
     def create(
@@ -120,7 +118,7 @@ class EpisodeWriter:
         layout = Layout(Path(root).expanduser().absolute())
         existing = read_manifest(layout)
         manifest.check()
-        manifest.check_continues(existing, layout.root)
+        manifest.check_fits(existing, f"--resume: cannot add to {str(layout.root)!r}")
         check_folders(layout)
         words = f"--resume: cannot add to dataset {str(layout.root)!r}"
         with explained(words), contextlib.ExitStack() as on_error:
@@ -175,7 +173,7 @@ class EpisodeWriter:
         extras = fit_columns(extras, types)
         self._unusable = "was interrupted while it saved an episode"  # until the state is known again
         try:
-            record, totals = self._stage(extras, types)
+            totals = self._stage(extras, types)
             self._publish(totals)
         except (OSError, HandrailError) as error:
             with contextlib.suppress(OSError):  # the next save overwrites leftovers, `repair` removes them
@@ -188,7 +186,7 @@ class EpisodeWriter:
                 f"episode {number} in {str(self.root)!r} could not be saved: {why}; the {number} saved"
                 " episodes are whole"
             ) from error
-        self._types, self._totals, self.last = types, totals, record
+        self._types, self._totals = types, totals
         self._episode = OpenEpisode(self._layout, self._manifest)
         self._unusable = ""
         with explained(f"episode {number} is saved, but the summary files are late; `repair` rebuilds them"):
@@ -230,8 +228,8 @@ class EpisodeWriter:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _stage(self, extras: Mapping[str, Scalar | None], types: ColumnTypes) -> tuple[EpisodeRecord, Totals]:
-        """Write every file under its temporary name; only renames are left to do."""
+    def _stage(self, extras: Mapping[str, Scalar | None], types: ColumnTypes) -> Totals:
+        """Write every file under its temporary name, only renames are left to do; return the totals then."""
         staging, episode, features = self._layout.staging, self._episode, self._manifest.features
         columns, stats = episode.finish(self._totals)
         write_synced(staging / "data.parquet", data_bytes(features, columns))
@@ -251,7 +249,7 @@ class EpisodeWriter:
             write_synced(staging / path.name, data or b"")
         for path in (self._layout.row(self.num_episodes), *(path for _, path in self._streams())):
             make_folder(path.parent)
-        return record, totals
+        return totals
 
     def _streams(self) -> list[tuple[Path, Path]]:
         """Return the staged and the final path of each video and of the data."""

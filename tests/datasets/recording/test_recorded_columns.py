@@ -185,6 +185,6 @@ def test_an_older_dataset_is_read_as_before(older, tmp_path):
 
 def test_resuming_an_older_dataset_is_one_clear_line(older):
     before = {path: path.stat().st_mtime_ns for path in older.rglob("*") if path.is_file()}
-    words = "an earlier version recorded it, without 'next.success'"
+    words = "of the existing episodes is none, got"
     refused(older, "--task", "reach", "--resume", told=words)
     assert {path: path.stat().st_mtime_ns for path in older.rglob("*") if path.is_file()} == before
