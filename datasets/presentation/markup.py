@@ -35,9 +35,7 @@ table = _piece("table")  # (Table): its title above and its caption below
 film = _piece("film")  # (address of a video)
 items = _piece("items")  # (pairs of a class of the style and a text): a list
 paragraph = _piece("paragraph")  # (text, look="")
-panels = _piece(
-    "panels"
-)  # (title, note and address of each figure, look=""): `small` or `wide`, or half the page
+panels = _piece("panels")  # (title, note, address of each figure, look=""): `small`, `wide`, or half a page
 legend = _piece("legend")  # (pairs of a label and its colour)
 gallery = _piece("gallery")  # (pairs of a caption and an address): small pictures
 card = _piece("card")  # (title, colour, text in large, lines)

@@ -21,9 +21,8 @@ class EpisodeSet:
         self.episodes = episodes
         self.scale = Scale()  # shared with the groups that these can be compared with
         self.modes: set[str] = set()  # that the frames name
-        self.found: dict[
-            str, list[float | str]
-        ] = {}  # by metric, of each episode: its value, or why it has none
+        # by metric, of each episode: its value, or why it has none
+        self.found: dict[str, list[float | str]] = {}
         self.frames: list[IntArray] = []  # that stand for each
         self.excerpts: dict[int, Demonstration] = {}  # these frames, by place in `episodes`
 

@@ -50,9 +50,7 @@ class Estimate:
     interval: Interval | None = None  # 95 %
     nested: Interval | None = None  # 95 % with the training of policies drawn anew, too, where that is known
     p: float | None = None  # two-sided, of there being no difference
-    counts: tuple[
-        int, ...
-    ] = ()  # units of the condition and of the baseline; one number where they are pairs
+    counts: tuple[int, ...] = ()  # units of condition and baseline; one number where they are pairs
     errors: tuple[tuple[float, float], ...] = ()  # standard error and degrees of freedom of each test
     paired: bool = False  # whether the same units were measured under both
     largest: float = float("inf")  # difference that there may be
@@ -71,9 +69,8 @@ class Value(Estimate):
     measure: Measure
     label: str  # of the condition
     scope: str = ""  # which episodes, task or tasks
-    values: FloatArray = field(
-        default_factory=lambda: np.empty(0), compare=False
-    )  # of each unit; NaN where it has none
+    values: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
+    """Of each unit; NaN where it has none."""
     reason: str = ""  # why there is none, the commonest if several
 
     @property

@@ -21,8 +21,7 @@ Chance = Callable[[Sequence[Run]], float]
 def chance_of_shares(runs: Sequence[Run]) -> float:
     """Return the variance of one replicate's share if only its rollouts were drawn: p (1 − p) / R."""
     values = np.concatenate([run.values for run in runs])
-    share = (values.sum() + _SUCCESSES) / (len(values) + _TRIALS)
-    return float(share * (1.0 - share) * len(replicates(runs)) / len(values))
+    return variance_of_share(values.sum(), len(values), len(values) / len(replicates(runs)))
 
 
 def chance_of_means(runs: Sequence[Run]) -> float:
@@ -101,7 +100,7 @@ def student(values: FloatArray | Sequence[float], least: float) -> Estimate:
     )
 
 
-def variance_of_share(successes: float, trials: int, each: int) -> float:
+def variance_of_share(successes: float, trials: int, each: float) -> float:
     """Return the variance of a share of so many trials `each`, p (1 − p) / R, p = (s + 2) / (n + 4).
 
     Args:
@@ -110,4 +109,4 @@ def variance_of_share(successes: float, trials: int, each: int) -> float:
         each: R, of one replicate.
     """
     share = (successes + _SUCCESSES) / (trials + _TRIALS)
-    return share * (1.0 - share) / each
+    return float(share * (1.0 - share) / each)
