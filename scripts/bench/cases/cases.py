@@ -32,9 +32,8 @@ class PaperCase(FrozenArrays):
     q: FloatArray  # where the robot starts, (n,)
     seconds: float  # how long [s]
     channels: tuple[str, ...]  # what the operator commands
-    command: Callable[
-        [float, float], FloatArray
-    ]  # time [s] and length of the run [s] → values of these channels
+    command: Callable[[float, float], FloatArray]
+    """Time [s] and length of the run [s] → values of these channels."""
     frames: Frames = field(default_factory=Frames)  # in which frames they are meant
     held: tuple[float, ...] = ()
     """Point where the hand is held by the hold objective [m]; empty when it is switched off."""

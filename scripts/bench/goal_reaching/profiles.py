@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner
 from handrail.controllers.arrays import FloatArray, IntArray
@@ -86,17 +87,14 @@ def _noisy(twists: FloatArray, rng: np.random.Generator) -> FloatArray:
     It is white noise through a fast low-pass minus the same through a slow one, scaled to variance 1: it
     comes and goes, and leaves the hand where it was.
     """
-    keep = np.exp(-STEP / np.array(_TREMOR))[:, None]
-    passed, tremor = np.zeros((2, 6)), np.empty_like(twists)
-    for step in range(len(twists)):
-        passed = keep * passed + (1.0 - keep) * rng.standard_normal(6)
-        tremor[step] = passed[0] - passed[1]
-    fast, slow = keep[:, 0]
+    white, keep = rng.standard_normal(twists.shape), np.exp(-STEP / np.array(_TREMOR))
+    one, other = (np.asarray(lfilter([1.0 - each], [1.0, -each], white, axis=0)) for each in keep)
+    fast, slow = keep
     own = (1.0 - fast) / (1.0 + fast) + (1.0 - slow) / (1.0 + slow)
     variance = own - 2.0 * (1.0 - fast) * (1.0 - slow) / (1.0 - fast * slow)
     speed, rate = (np.linalg.norm(part, axis=1, keepdims=True) for part in (twists[:, :3], twists[:, 3:]))
     sizes = np.repeat(np.hstack([speed, rate]), 3, axis=1)
-    return twists + _NOISE / np.sqrt(variance) * sizes * tremor
+    return twists + _NOISE / np.sqrt(variance) * sizes * (one - other)
 
 
 def _quantised(twists: FloatArray) -> FloatArray:

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+from handrail.controllers.strict_toml import read_toml
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.scripts.bench.goal_reaching.metrics import AIM, COST, METRICS, SAFETY, SETTLED, SHOWN
 
@@ -15,33 +17,12 @@ _PAIRED = (
 )
 
 
-def _published(*table: tuple[float, ...]) -> dict[str, dict[str, float]]:
-    statistics = ("mean", "std", "min", "max")
-    rows = (dict[str, float](zip(statistics, values, strict=False)) for values in table)
-    return dict(zip(METRICS, rows, strict=True))
-
-
 PUBLISHED: Mapping[str, Mapping[str, Mapping[str, float]]] = {
-    "paper: RL": _published(
-        (0.97,),
-        (0.129, 0.341, 0.021, 3.503),
-        (0.037, 0.089, 0.000, 0.903),
-        (340.5, 134.6),
-        (62.6, 82.4),
-        (1.35, 0.84),
-        (0.681, 0.277),
-        (1.82, 0.66),
-    ),
-    "paper: proposed": _published(
-        (0.97,),
-        (0.098, 0.047, 0.032, 0.416),
-        (0.028, 0.016, 0.000, 0.050),
-        (340.6, 136.8),
-        (16.7, 14.2),
-        (1.64, 0.72),
-        (0.074, 0.069),
-        (3.40, 1.34),
-    ),
+    name: {
+        metric: dict(zip(("mean", "std", "min", "max"), values, strict=False))
+        for metric, values in table.items()
+    }
+    for name, table in read_toml(Path(__file__).with_name("published.toml"), "published figures").items()
 }
 """The paper's Table I, 100 goals: controller → measure → mean, std, min, max, as far as given."""
 

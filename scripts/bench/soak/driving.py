@@ -4,7 +4,6 @@ The page is a socket. It drives, ends its episodes, falls silent, answers late, 
 recording are frozen, killed, put on a slow disk and on a clock that jumps. Memory and open files are noted.
 """
 
-import hashlib
 import re
 import signal
 import sys
@@ -18,6 +17,9 @@ import numpy as np
 import psutil
 from websockets.exceptions import WebSocketException
 
+from handrail.datasets.format.episode_rows import row_files
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.metadata import Checksum
 from handrail.scripts.bench.page import Page
 from handrail.scripts.bench.soak.child import Child, hear_signals, send, wait_until, words_of
 from handrail.scripts.bench.soak.notes import DRIVING, MEMORY, next_number, note
@@ -113,7 +115,6 @@ class DrivenHours:
         words = "cockpit {} --cockpit.no_open --cockpit.port 0 --dataset.num_episodes 1000000"
         self._child = Child(words_of(words, self._root), out, f"driven-{first}")
         self._rng = np.random.default_rng([7, first])
-        self._sums: dict[str, str] = {}
         self._looked = 0.0
 
     def run(self, until: float) -> None:
@@ -180,20 +181,14 @@ class DrivenHours:
         children = psutil.Process(self._child.pid).children()
         return [each.pid for each in children if "cockpit.server" in " ".join(each.cmdline())][-1]
 
-    def _known(self, anew: bool = False) -> dict[str, str]:
-        """Return a digest of every file of saved episodes; each is read once, and all at the end."""
-        known = {}
-        for path in self._root.glob("meta/episodes/*/*.parquet"):
-            data = self._root / "data" / path.relative_to(self._root / "meta" / "episodes")
-            for file in (path, data):
-                name = str(file.relative_to(self._root))
-                if anew or name not in self._sums:
-                    self._sums[name] = hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else ""
-                known[name] = self._sums[name] if file.exists() else ""
-        return known
+    def _known(self) -> dict[str, Checksum]:
+        """Return the checksum of every file of saved episodes that is there."""
+        rows = [path.relative_to(self._root / "meta/episodes") for path in row_files(Layout(self._root))]
+        files = [self._root / folder / row for row in rows for folder in ("meta/episodes", "data")]
+        return {str(file.relative_to(self._root)): Checksum.of(file) for file in files if file.exists()}
 
-    def _note(self, fault: str, before: dict[str, str], complaints: list[str], **row: Any) -> None:
-        now = self._known(anew="code" in row)
+    def _note(self, fault: str, before: dict[str, Checksum], complaints: list[str], **row: Any) -> None:
+        now = self._known()
         lost = [each for each in before if now.get(each) != before[each]]
         complaints += [f"{each} was saved and is gone or another" for each in lost]
         row |= {"round": self._number, "fault": fault, "work": "drive in the browser, one process"}

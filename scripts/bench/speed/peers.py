@@ -1,8 +1,6 @@
 """Other solvers on the problems of a loop: the converged one, differential inverse kinematics, QP solvers."""
 
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from time import monotonic
@@ -29,7 +27,6 @@ Take = Callable[[Update], Solve]
 """Takes the problem of an update; what this does is not timed."""
 
 _PATIENCE = 20.0  # of a case, with one peer [s]
-_MOST = 60.0  # of one problem [s]
 _TOLERANCE = 1e-6  # of the interior-point method
 _NEAREST = 20  # pairs that pink's barrier looks at, at most
 _KEPT = 0.02  # distance that it keeps, of all pairs alike [m]
@@ -53,13 +50,7 @@ class Peer:
         if self._spent > _PATIENCE:
             return
         begun = monotonic()
-        try:
-            with _at_most(_MOST):
-                solved = self._times.of(self._take(update)) is not None
-        except TimeoutError:
-            self._spent = np.inf
-            return
-        self._solved.append(solved)
+        self._solved.append(self._times.of(self._take(update)) is not None)
         self._ours.append(update.cpu)
         self._spent += monotonic() - begun
 
@@ -71,22 +62,6 @@ class Peer:
             return counts
         ratio = float(np.median(ours) / np.median(self._times.cpu[1:]))
         return {**counts, **self._times.spreads(1), "ratio": ratio}
-
-
-@contextmanager
-def _at_most(seconds: float) -> Iterator[None]:
-    """Raise a TimeoutError after some time, once a call of a library returns."""
-
-    def ring(*_: object) -> None:
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def _ipopt(loop: TimingLoop) -> Take:

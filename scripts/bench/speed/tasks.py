@@ -13,7 +13,6 @@ from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.robot.shape import Obstacle
 from handrail.scripts.bench.speed.timing_loop import Times
 
 _FPS = 20  # [Hz]
@@ -26,27 +25,15 @@ class TimedController:
     Attributes:
         times: of all updates.
         rows: of the distances, in every update that has a plan.
-        braked: updates that braked.
     """
 
     def __init__(self, mpc: MaskedMpc) -> None:
-        self._mpc = mpc
-        self.times = Times()
-        self.rows: list[int] = []
-        self.braked = 0
-
-    def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
-        """Pass it on."""
-        self._mpc.reset(obstacles)
-
-    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Pass it on."""
-        self._mpc.update_scene(obstacles)
+        self._mpc, self.reset, self.update_scene = mpc, mpc.reset, mpc.update_scene
+        self.times, self.rows = Times(), list[int]()
 
     def update(self, state: State, intent: Intent) -> Command:
         """Pass it on, and take the time."""
         command = self.times.of(self._mpc.update, state, intent)
-        self.braked += command.diagnostics.status.brakes
         if self._mpc.plan is not None:
             self.rows.append(self._mpc.plan.rows)
         return command
@@ -72,7 +59,7 @@ def task_row(robot: str, task: str, updates: int, seed: int) -> dict[str, Any]:
         "updates": len(timed.times.cpu) - _COLD,
         "episodes": len(outcomes),
         "successes": sum(outcome.success for outcome in outcomes),
-        "braked": timed.braked,
+        "braked": sum(outcome.brakes for outcome in outcomes),
         "watched_pairs": mpc.loop.surroundings.collision.size,
         "rows_mean": float(np.mean(timed.rows)),
         **timed.times.spreads(_COLD),
