@@ -114,7 +114,7 @@ def jerkiness(velocities: FloatArray) -> float:
 
 Row = Mapping[str, Any]
 _COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
-_KEPT = (*(name for name in METRICS if name != "wall_time_s"), *SAFETY, *SETTLED)
+KEPT = (*(name for name in METRICS if name != "wall_time_s"), *SAFETY, *SETTLED)
 _PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
 
 
@@ -135,7 +135,7 @@ def summarise(
     names, profiles = [baseline.name for baseline in baselines], config.profile_names
     cells = {profile: {name: rows_of(rows, profile, name) for name in names} for profile in profiles}
     summaries = {
-        profile: {name: _summary(own) for name, own in by_name.items()} for profile, by_name in cells.items()
+        profile: {name: summary(own) for name, own in by_name.items()} for profile, by_name in cells.items()
     }
     return {
         "controllers": summaries[profiles[0]],
@@ -164,7 +164,7 @@ def measures_by_goal(results: Mapping[str, Any]) -> dict[str, Any]:
     rows = results["episodes"]
     return {
         profile: {
-            name: {metric: [row[metric] for row in rows_of(rows, profile, name)] for metric in _KEPT}
+            name: {metric: [row[metric] for row in rows_of(rows, profile, name)] for metric in KEPT}
             for name in summaries
         }
         for profile, summaries in results["profiles"].items()
@@ -183,23 +183,24 @@ def column(rows: Sequence[Row], metric: str, known: bool = False) -> FloatArray:
     return values[np.isfinite(values)] if known else values
 
 
-def _summary(rows: Sequence[Row]) -> dict[str, Any]:
-    summary: dict[str, Any] = {"episodes": len(rows)}
+def summary(rows: Sequence[Row]) -> dict[str, Any]:
+    """Return mean, std, min and max of every measure over its episodes, and what is counted."""
+    found: dict[str, Any] = {"episodes": len(rows)}
     for metric in SHOWN:
         values = column(rows, metric, known=True)
         if len(values):
-            summary[metric] = {
+            found[metric] = {
                 "mean": float(values.mean()),
                 "std": float(values.std(ddof=1)) if len(values) > 1 else 0.0,
                 "min": float(values.min()),
                 "max": float(values.max()),
             }
     successes = sum(row["success"] for row in rows)
-    summary["success"]["interval"] = list(wilson(successes, len(rows)))
-    summary["episodes_with_contact"] = sum(row["contacts"] > 0 for row in rows)
+    found["success"]["interval"] = list(wilson(successes, len(rows)))
+    found["episodes_with_contact"] = sum(row["contacts"] > 0 for row in rows)
     errors = "planned_position_error", "final_position_error"
-    summary["beyond_aim"] = {name: int(np.sum(column(rows, name) > AIM)) for name in errors}
-    return summary
+    found["beyond_aim"] = {name: int(np.sum(column(rows, name) > AIM)) for name in errors}
+    return found
 
 
 def _paired(cells: Mapping[str, Sequence[Row]], seed: int) -> dict[str, Any]:

@@ -11,9 +11,7 @@ from handrail.controllers.typed import AtLeastOne, Count, Fraction, NonNegative,
 from handrail.datasets.lists import Numbers
 from handrail.policies.imitation.config import check_installed
 
-_FREE_ON_RESUME = (
-    *("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average", "resume"),
-)
+_FREE_ON_RESUME = ("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average", "resume")
 _Share = Annotated[float, Meta(gt=0, le=1)]
 
 
@@ -64,6 +62,11 @@ class TrainRlConfig:
     def folder(self) -> Path:
         """The folder of the run."""
         return Path(self.output_dir).expanduser()
+
+    @property
+    def tensorboard(self) -> str:
+        """The folder of TensorBoard's curves."""
+        return str(self.folder / "tensorboard")
 
     def check(self) -> None:
         """Check the settings."""

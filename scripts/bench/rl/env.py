@@ -1,7 +1,7 @@
 """The goal-reaching task as a Gymnasium environment: the policy drives the base; and how good it is at it."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import gymnasium
@@ -20,7 +20,9 @@ from handrail.collect.world.tasks.goal_reaching import (
 )
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_twist
+from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.model import Pose, load_model
+from handrail.policies.rl.controller import RlController
 from handrail.policies.rl.observation import (
     ACTION_SIZE,
     OBSERVATION_SIZE,
@@ -28,17 +30,14 @@ from handrail.policies.rl.observation import (
     base_velocity,
     observe,
 )
-from handrail.scripts.bench.goal_reaching.metrics import arm_effort, jerkiness
+from handrail.policies.rl.policy import Actor
+from handrail.scripts.bench.goal_reaching.config import BASELINES, BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.episode import Conditions, run_episode
+from handrail.scripts.bench.goal_reaching.metrics import KEPT, Row, measure, summary
 from handrail.scripts.bench.goal_reaching.scenes import empty_floor, plant
 
 EVALUATION_SEED = 20_000  # of the goals watched in training, which are others
 FINAL_SEED = 30_000  # of the goals that nobody saw before
-
-Policy = Callable[[FloatArray], FloatArray]
-
-Score = dict[str, float]
-"""One episode, in the terms of the paper's Table I: success, position_error at the end [m] and
-orientation_error, length [steps], arm_effort, base_path [m], jerkiness, contacts [steps]."""
 
 _BOUND = 20.0  # of any number in an observation
 _OF_ACTIONS = 0.05  # weights of the action and of its change in the reward
@@ -157,43 +156,22 @@ def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Pose, ...
     return tuple(sample_goal(rng) for _ in range(count))
 
 
-def evaluate(policy: Policy, goals: Iterable[Pose], physics: bool = True) -> list[Score]:
-    """Return the score of every goal, early failure off."""
-    env = GoalReachingEnv(early_failure=False, physics=physics)
-    return [_score(env, policy, goal) for goal in goals]
+def evaluate(actor: Actor, goals: Iterable[Pose], physics: bool = True) -> list[Row]:
+    """Return what the benchmark measures of an actor on every goal."""
+    model, config = load_model(), BenchmarkConfig(physics=physics)
+    collision, controller = CollisionModel(model, ()), RlController(model, actor=actor)
+    rows = []
+    for goal in goals:
+        trace = run_episode(model, BASELINES["rl"], controller, Conditions(goal, empty_floor(), config))
+        rows.append(measure(trace, collision, ACTION_SIZE))
+    return rows
 
 
-def spreads(scores: Sequence[Score]) -> dict[str, dict[str, float]]:
-    """Return mean, standard deviation, smallest and largest of every measure."""
-    columns = {name: [score[name] for score in scores] for name in scores[0]}
-    return {
-        name: {"mean": float(np.mean(x)), "std": float(np.std(x)), "min": min(x), "max": max(x)}
-        for name, x in columns.items()
-    }
+def spreads(rows: Sequence[Row]) -> dict[str, dict[str, float]]:
+    """Return mean, standard deviation, smallest and largest of every measure but times."""
+    return {name: each for name, each in summary(rows).items() if name in KEPT}
 
 
-def means(scores: Sequence[Score]) -> dict[str, float]:
-    """Return the mean of every measure."""
-    return {name: values["mean"] for name, values in spreads(scores).items()}
-
-
-def _score(env: GoalReachingEnv, policy: Policy, goal: Pose) -> Score:
-    """Run a policy until the episode ends."""
-    observation, _ = env.reset(options={"goal": goal})
-    velocities, contacts, done, info = [], 0, False, {}
-    while not done:
-        observation, _, terminated, truncated, info = env.step(policy(observation))
-        velocities.append(env.velocity)
-        contacts += info["touches"]
-        done = terminated or truncated
-    v = np.array(velocities)  # (T, 9)
-    return {
-        "success": float(info["is_success"]),
-        "position_error": info["position_error"],
-        "orientation_error": info["orientation_error"],
-        "length": float(len(v)),
-        "arm_effort": arm_effort(v[:, 3:]),
-        "base_path": float(STEP * np.linalg.norm(v[:, :2], axis=1).sum()),
-        "jerkiness": jerkiness(v),
-        "contacts": float(contacts),
-    }
+def means(rows: Sequence[Row]) -> dict[str, float]:
+    """Return the mean of every measure but times."""
+    return {name: values["mean"] for name, values in spreads(rows).items()}

@@ -12,7 +12,6 @@ import numpy as np
 import torch
 from gymnasium import spaces
 from gymnasium.wrappers import TransformObservation
-from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
 from handrail.controllers.interrupts import Interrupts
@@ -24,16 +23,7 @@ from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.rl.observation import conditioning
 from handrail.policies.rl.policy import Actor
 from handrail.scripts.bench.goal_reaching.tables import PUBLISHED
-from handrail.scripts.bench.rl.checkpoint import (
-    SHOWN,
-    Curve,
-    begin_run,
-    check_resumes,
-    evaluated_actors,
-    resume_run,
-    start_from,
-    write_checkpoint,
-)
+from handrail.scripts.bench.rl.checkpoint import Learner, begin_run
 from handrail.scripts.bench.rl.config import TrainRlConfig
 from handrail.scripts.bench.rl.env import (
     FINAL_SEED,
@@ -45,14 +35,19 @@ from handrail.scripts.bench.rl.env import (
 )
 
 _TARGET_ENTROPY = -3.0
-_BUFFER = 100_000  # transitions that are kept
+BUFFER = 100_000  # transitions that are kept
 _PLACES = ("output_dir", "resume")  # of a run, not of what came out
+_SHOWN = {  # in the figure of the curve
+    "success": "share of goals reached",
+    "arm_effort": "arm effort Σ‖q̇‖² [rad²/s²]",
+    "jerkiness": "jerkiness [m/s², rad/s²]",
+}
 
 
 def train(config: TrainRlConfig) -> dict[str, Any]:
     """Train, or go on training, and return the record that was written beside the actor.
 
-    The folder holds `config.json`, `checkpoints/<steps>/` (networks, replay buffer, curve; only the last),
+    The folder holds `config.json`, `checkpoint.zip` (of the last evaluation or interrupt),
     `actors/<steps>.npz` (all), `tensorboard/`, and at the end `actor.npz`, `actor.json` and `curve.png`.
 
     Raises:
@@ -61,45 +56,43 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     """
     config.check()
     torch.set_num_threads(1)
-    curve: Curve = []
-    seconds, last = 0.0, check_resumes(config) if config.resume else None
-    if last is None:
+    if config.resume:
+        model = Learner.resumed(config, environment(config))
+    else:
         begin_run(config)
-    model = new_model(config)
-    if last is not None:
-        curve, seconds = resume_run(last, model)
-        model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
-    elif config.start_from:
-        start_from(Path(config.start_from).expanduser(), model)
-    _learn(config, model, curve, seconds)
-    actor = Actor.mean(evaluated_actors(config.folder, config.average))
+        model = new_model(config)
+        if config.start_from:
+            model.start_from(Path(config.start_from).expanduser())
+    _learn(config, model)
+    last = sorted((config.folder / "actors").glob("*.npz"))[-config.average :]
+    actor = Actor.mean([Actor.load(path) for path in last])
     actor.save(config.folder / "actor.npz")
     final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED), config.physics))
-    record = _record(config, curve, final)
+    record = _record(config, model.curve, final)
     write_json(config.folder / "actor.json", record)
-    write_whole(config.folder / "curve.png", png(_figure(curve)))
+    write_whole(config.folder / "curve.png", png(_figure(model.curve)))
     return record
 
 
-def _learn(config: TrainRlConfig, model: SAC, curve: Curve, seconds: float) -> None:
+def _learn(config: TrainRlConfig, model: Learner) -> None:
     """Make the steps that remain, until an interrupt."""
     remaining = max(config.steps - model.num_timesteps, 0)
-    if not remaining and _is_evaluated(model, curve):
+    if not remaining and _is_evaluated(model):
         return
     try:
         with Interrupts() as interrupts, interrupts.deferred():
-            callback = Watch(config, curve, seconds, interrupts)
+            callback = Watch(config, model.seconds, interrupts)
             model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
     except KeyboardInterrupt:
         goes_on = f"--resume goes on after step {model.num_timesteps}"
         raise KeyboardInterrupt(f"training: interrupted; {goes_on}") from None
 
 
-def _is_evaluated(model: SAC, curve: Curve) -> bool:
-    return bool(curve) and curve[-1]["steps"] == model.num_timesteps
+def _is_evaluated(model: Learner) -> bool:
+    return bool(model.curve) and model.curve[-1]["steps"] == model.num_timesteps
 
 
-def actor_of(model: SAC) -> Actor:
+def actor_of(model: Learner) -> Actor:
     """Return the actor of a model as plain arrays."""
     state = {name: value.cpu().numpy() for name, value in model.actor.state_dict().items()}
     return Actor.from_state(state, conditioning())
@@ -110,16 +103,15 @@ class Watch(BaseCallback):
 
     Args:
         config: of the training.
-        curve: evaluations so far; more are appended.
         seconds: of training so far.
         interrupts: one of them ends the training, and an evaluation too.
     """
 
-    model: SAC
+    model: Learner
 
-    def __init__(self, config: TrainRlConfig, curve: Curve, seconds: float, interrupts: Interrupts) -> None:
+    def __init__(self, config: TrainRlConfig, seconds: float, interrupts: Interrupts) -> None:
         super().__init__()
-        self._config, self._curve, self._interrupts = config, curve, interrupts
+        self._config, self._interrupts = config, interrupts
         self._goals = evaluation_goals(config.goals)
         self._began = time.monotonic() - seconds
 
@@ -129,15 +121,14 @@ class Watch(BaseCallback):
         return not self._interrupts.asked
 
     def _on_training_end(self) -> None:
-        if not _is_evaluated(self.model, self._curve):
+        if not _is_evaluated(self.model):
             self._evaluate_and_save()
-        if not _is_evaluated(self.model, self._curve):  # an interrupt does not wait for that
-            write_checkpoint(self._config.folder, self.model, None, [*self._curve, self._row()])
+        if not _is_evaluated(self.model):  # an interrupt does not wait for that
+            self._save()
 
-    def _row(self) -> dict[str, float]:
-        """Return how far the training is."""
-        seconds, updates = time.monotonic() - self._began, float(self.model._n_updates)
-        return {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
+    def _save(self) -> None:
+        self.model.seconds = time.monotonic() - self._began
+        self.model.write(self._config.folder)
 
     def _evaluate_and_save(self) -> None:
         actor = actor_of(self.model)
@@ -145,36 +136,41 @@ class Watch(BaseCallback):
         scores = evaluate(actor, goals, self._config.physics)
         if self._interrupts.asked:
             return
-        row = self._row()
-        score = means(scores)
-        self._curve.append({**row, "learning_rate": self._config.learning_rate, **score})
+        score, seconds = means(scores), time.monotonic() - self._began
+        row = {"steps": self.num_timesteps, "updates": float(self.model._n_updates), "seconds": seconds}
+        self.model.curve.append({**row, "learning_rate": self._config.learning_rate, **score})
         for name, value in score.items():
             self.logger.record(f"evaluation/{name}", value)
         self.logger.dump(self.num_timesteps)
         Terminal().print(
-            f"{self.num_timesteps} of {self._config.steps} steps, {row['seconds']:.0f} s: "
+            f"{self.num_timesteps} of {self._config.steps} steps, {seconds:.0f} s: "
             f"{score['success']:.0%} of the goals, {_words(score)}"
         )
-        write_checkpoint(self._config.folder, self.model, actor, self._curve)
+        actor.save(self._config.folder / "actors" / f"{self.num_timesteps:08d}.npz")
+        self._save()
 
 
 def _words(score: dict[str, float]) -> str:
     return f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
 
 
-def new_model(config: TrainRlConfig) -> SAC:
-    """Return an actor and critics that have learned nothing."""
+def environment(config: TrainRlConfig) -> Any:
+    """Return the task as the networks see it."""
     matrix = conditioning()
     space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
     env = GoalReachingEnv(
         failure_cost=config.failure_cost, physics=config.physics, repeat_missed=config.repeat_missed
     )
-    env = TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)
-    return SAC(
+    return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)
+
+
+def new_model(config: TrainRlConfig) -> Learner:
+    """Return an actor and critics that have learned nothing."""
+    model = Learner(
         "MlpPolicy",
-        env,
+        environment(config),
         learning_rate=config.learning_rate,
-        buffer_size=_BUFFER,
+        buffer_size=BUFFER,
         learning_starts=config.random_steps,
         batch_size=config.batch_size,
         tau=config.tau,
@@ -182,13 +178,17 @@ def new_model(config: TrainRlConfig) -> SAC:
         ent_coef=f"auto_{config.temperature}",
         target_entropy=_TARGET_ENTROPY,
         policy_kwargs={"net_arch": list(config.layers), "optimizer_kwargs": {"fused": True}},
-        tensorboard_log=str(config.folder / "tensorboard"),
+        tensorboard_log=config.tensorboard,
         seed=config.seed,
         device="cpu",
     )
+    model.curve, model.seconds = [], 0.0
+    return model
 
 
-def _record(config: TrainRlConfig, curve: Curve, final: dict[str, dict[str, float]]) -> dict[str, Any]:
+def _record(
+    config: TrainRlConfig, curve: list[dict[str, float]], final: dict[str, dict[str, float]]
+) -> dict[str, Any]:
     """Return what a reader needs to repeat a training, the seed too."""
     settings = {name: value for name, value in asdict(config).items() if name not in _PLACES}
     if config.start_from:
@@ -216,11 +216,11 @@ def _processor() -> str:
     return names[0] if names else platform.machine()
 
 
-def _figure(curve: Curve) -> Any:
+def _figure(curve: list[dict[str, float]]) -> Any:
     """Return what the evaluations said over steps, with the published figures, as a figure."""
     figure = new_figure(11, 3.4)
-    axes = figure.subplots(1, len(SHOWN))
-    for ax, (name, title) in zip(axes, SHOWN.items(), strict=True):
+    axes = figure.subplots(1, len(_SHOWN))
+    for ax, (name, title) in zip(axes, _SHOWN.items(), strict=True):
         published = PUBLISHED["paper: RL"][name]["mean"]
         ax.plot([row["steps"] / 1000 for row in curve], [row[name] for row in curve], color=COLOURS[0])
         ax.axhline(published, color=GREY, linestyle="--", label="published")

@@ -12,13 +12,13 @@ from rl_helpers import TINY_RL
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.rl.policy import Actor
+from handrail.scripts.bench.rl import env
 from handrail.scripts.bench.rl.env import FINAL_SEED, GoalReachingEnv, evaluate, evaluation_goals, means
 
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("tensorboard")
-import torch
-
-from handrail.scripts.bench.rl.train import train
+from handrail.scripts.bench.rl.checkpoint import Learner
+from handrail.scripts.bench.rl.train import environment, train
 
 
 @pytest.fixture(scope="module")
@@ -42,11 +42,14 @@ def test_a_resumed_run_goes_on_where_it_stopped(run):
 
 
 def test_a_resumed_run_remembers_learns_at_the_new_rate_and_meets_new_goals(run):
-    state = torch.load(run[0].folder / "checkpoints" / "00000100" / "state.pt", weights_only=True)
-    for part in ("actor.optimizer", "critic.optimizer"):
-        assert state["networks"][part]["param_groups"][0]["lr"] == 2e-4
-    assert state["place"] == [100, False]
-    first, resumed = (state["transitions"]["observations"][place, 0] for place in (0, 60))
+    config = replace(run[0], learning_rate=2e-4)
+    model = Learner.resumed(config, environment(config))
+    for optimizer in (model.actor.optimizer, model.critic.optimizer):
+        assert optimizer.param_groups[0]["lr"] == 2e-4
+    buffer = model.replay_buffer
+    assert buffer is not None
+    assert (buffer.pos, buffer.full) == (100, False)
+    first, resumed = (buffer.observations[place, 0] for place in (0, 60))
     assert not np.allclose(first[30:42], resumed[30:42])  # the goal
 
 
@@ -121,24 +124,23 @@ def test_settings_that_make_no_sense_are_refused(name):
 def test_an_interrupted_run_saves_a_checkpoint_and_goes_on(at, steps, tmp_path, monkeypatch):
     """SIGTERM comes before the first evaluation, or during it; no evaluation is waited for."""
     config, calls = replace(TINY_RL, output_dir=str(tmp_path / "rl"), goals=2, steps=50), Counter[str]()
-    reset, step = GoalReachingEnv.reset, GoalReachingEnv.step
 
     def counted(name, call):
-        def called(*arguments, **options):
-            calls[name] += name == "step" or bool(options.get("options"))
-            if name.endswith(at) and calls[name] == {"step": 30, "evaluation": 1}[at]:
+        def called(*arguments):
+            calls[name] += 1
+            if name == at and calls[name] == {"step": 30, "evaluation": 1}[at]:
                 os.kill(os.getpid(), signal.SIGTERM)
-            return call(*arguments, **options)
+            return call(*arguments)
 
         return called
 
     with monkeypatch.context() as patch:
-        patch.setattr(GoalReachingEnv, "step", counted("step", step))
-        patch.setattr(GoalReachingEnv, "reset", counted("evaluation", reset))
+        patch.setattr(GoalReachingEnv, "step", counted("step", GoalReachingEnv.step))
+        patch.setattr(env, "run_episode", counted("evaluation", env.run_episode))
         with pytest.raises(KeyboardInterrupt, match=f"interrupted; --resume goes on after step {steps}$"):
             train(config)
     assert calls["evaluation"] == (at == "evaluation"), "it evaluates on"
-    assert [path.name for path in (config.folder / "checkpoints").iterdir()] == [f"{steps:08d}"]
+    assert Learner.resumed(config, environment(config)).num_timesteps == steps
     record = train(replace(config, resume=True))
     assert [row["steps"] for row in record["curve"]] == ([40, 50] if at == "step" else [50])
     assert record["updates"] == 29  # the interrupted step makes none
