@@ -65,11 +65,3 @@ class Plan(NamedTuple):
     active: IntArray = np.empty(0, dtype=int)
     """Names of those that hold with equality, for the next problem among the same pairs."""
     phases: tuple[tuple[str, float], ...] = ()  # where the time went: `residuals`, `distances`, `solve` [s]
-
-    def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
-        """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
-        bound = problem.limits.acceleration * (1.0 + tolerance) + tolerance
-        if not (self.solved and np.all(np.abs(self.u) <= bound)):
-            return False
-        q, v = problem.rollout(self.u)
-        return bool(np.all(np.abs(self.q - q) <= tolerance) and np.all(np.abs(self.v - v) <= tolerance))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from ideal_robot import without_shapes
+from plans import is_solution
 
 from handrail.controllers.core.library import functions
 from handrail.controllers.interface.controller import State
@@ -68,7 +69,7 @@ def test_both_solvers_agree_where_the_real_time_one_rests():
         problem = mpc.build_problem(random_state(rng), random_intent(mpc, rng))
         u = fixed_point(mpc, problem)
         plan = converged.solve(problem, np.zeros_like(u))
-        assert plan.is_solution(problem)
+        assert is_solution(plan, problem)
         np.testing.assert_allclose(
             evaluate(problem, plan.u).cost, evaluate(problem, u).cost, rtol=1e-4, atol=1e-4
         )
@@ -141,7 +142,7 @@ def test_an_obstacle_is_kept_away_from():
     problem = mpc.build_problem(State(DESCRIPTION.home, np.zeros(9)), Intent(values, mask))
     guess = np.zeros((10, 9))
     plan = solver(mpc).solve(problem, guess)
-    assert plan.is_solution(problem)
+    assert is_solution(plan, problem)
     assert plan.collision_slack < 1e-5
     assert evaluate(problem, plan.u).cost < evaluate(problem, guess).cost
     real_time = fixed_point(mpc, problem, 30)

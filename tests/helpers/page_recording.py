@@ -8,14 +8,25 @@ import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pyarrow.parquet as pq
 from page_driver import PageDriver
 
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.reading.reader import read_episodes, read_info
-from handrail.scripts.bench.latency.measure import family
 
 _PERIOD = 0.05  # of a frame [s]
+
+
+def family(process):
+    """Return a process and its descendants, with their command lines."""
+    found = {}
+    with contextlib.suppress(psutil.Error):
+        first = psutil.Process(process)
+        for each in (first, *first.children(recursive=True)):
+            with contextlib.suppress(psutil.Error):
+                found[each.pid] = "\0".join(each.cmdline())
+    return found
 
 
 def command(*words):

@@ -63,24 +63,13 @@ class LatencyConfig(ReportConfig):
             raise HandrailError(f"--browser {self.browser}: expected a program, such as /usr/bin/chromium")
 
 
-def family(process: int) -> dict[int, str]:
-    """Return a process and its descendants, with their command lines."""
-    found = {}
-    with contextlib.suppress(psutil.Error):
-        first = psutil.Process(process)
-        for each in (first, *first.children(recursive=True)):
-            with contextlib.suppress(psutil.Error):
-                found[each.pid] = "\0".join(each.cmdline())
-    return found
-
-
 def _spent(recording: int) -> Mapping[str, float]:
     """Return how long our programs have kept a processor busy [s], by what they are."""
-    spent = defaultdict[str, float](float)
-    for process, words in family(os.getpid()).items():
+    spent, first = defaultdict[str, float](float), psutil.Process()
+    for process in (first, *first.children(recursive=True)):
         with contextlib.suppress(psutil.Error):
-            name = "recording" if process == recording else _program(words)
-            spent[name] += sum(psutil.Process(process).cpu_times()[:2])
+            name = "recording" if process.pid == recording else _program("\0".join(process.cmdline()))
+            spent[name] += sum(process.cpu_times()[:2])
     return spent
 
 

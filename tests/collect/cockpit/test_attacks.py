@@ -12,11 +12,10 @@ import cockpit_attacks
 import numpy as np
 import pytest
 from cockpit_helpers import ask, drive, page
-from page_recording import Recording
+from page_recording import Recording, family
 from websockets.exceptions import ConnectionClosed
 
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.scripts.bench.latency.measure import family
 
 pytestmark = pytest.mark.slow
 ROUNDS = 2  # the first one shows how much room the server takes, the second that it takes no more

@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 from cockpit_witness import Relay, Witness, closing, is_moving, is_still
 from page_driver import PageDriver
-from page_recording import Recording
+from page_recording import Recording, family
 
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.scripts.bench.latency.measure import family
 
 pytestmark = pytest.mark.slow
 WITHIN = 0.3  # [s]

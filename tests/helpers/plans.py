@@ -1,0 +1,14 @@
+"""Whether a plan is one."""
+
+import numpy as np
+
+_TOLERANCE = 1e-6
+
+
+def is_solution(plan, problem):
+    """Return whether a plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
+    bound = problem.limits.acceleration * (1.0 + _TOLERANCE) + _TOLERANCE
+    if not (plan.solved and np.all(np.abs(plan.u) <= bound)):
+        return False
+    pairs = zip((plan.q, plan.v), problem.rollout(plan.u), strict=True)
+    return all(bool(np.all(np.abs(one - other) <= _TOLERANCE)) for one, other in pairs)
