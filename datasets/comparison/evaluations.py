@@ -97,6 +97,11 @@ class Condition:
         return (SUCCESS, *sorted(set.intersection(*numbers) - {SUCCESS, "seed"}))
 
     @property
+    def amount(self) -> Mapping[str, float]:
+        """The data of the first policy."""
+        return self.policies[0].trained_on
+
+    @property
     def successes(self) -> int:
         """How many rollouts succeeded."""
         return sum(bool(rollout[SUCCESS]) for rollout in self.rollouts)
@@ -110,7 +115,7 @@ class Condition:
             "rollouts": len(self.rollouts),
             "seeds": [float(run.values.mean()) for run in self.runs()],
             "draws": len({policy.draw for policy in self.policies}),
-            "trained_on": self.policies[0].trained_on,
+            "trained_on": self.amount,
         }
 
     def runs(self, outcome: str = SUCCESS) -> list[Run]:

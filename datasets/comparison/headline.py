@@ -6,7 +6,7 @@ from itertools import islice
 from handrail.datasets.comparison.collection import SUCCESS
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.policies import Outcomes
-from handrail.datasets.comparison.report import TEXTS, sentence
+from handrail.datasets.comparison.report import sentence
 from handrail.datasets.presentation.wording import number, percent, percent_span
 from handrail.datasets.statistics.contrast import SHARE, Contrast, Value
 
@@ -56,14 +56,26 @@ def cautions(comparison: Comparison) -> dict[str, bool]:
     policies = [each.content for each in outcomes.conditions.values()] if outcomes else []
     data = [each["trained_on"] for each in policies]
     amounts = [[each[name] for each in data if name in each] for name in ("episodes", "operator_time")]
-    holds = {
-        "no_policies": not policies,
-        "few_seeds": any(len(each["seeds"]) < 5 for each in policies),
-        "one_draw": bool(policies) and all(each["draws"] == 1 for each in policies),
-        "no_pairs": any(not each.paired for each in outcomes.differences) if outcomes else False,
-        "amounts": any(max(known) > 1.05 * min(known) for known in amounts if known),
-        "rates": len(rates) > 1 and any(e.interval for e in differences if e.measure.name in moving),
-        "units": any(each.incomparable for each in differences),
-        "few": fewest < 20,
+    return {
+        _NO_POLICIES: not policies,
+        _FEW_SEEDS: any(len(each["seeds"]) < 5 for each in policies),
+        _ONE_DRAW: bool(policies) and all(each["draws"] == 1 for each in policies),
+        _NO_PAIRS: any(not each.paired for each in outcomes.differences) if outcomes else False,
+        _AMOUNTS: any(max(known) > 1.05 * min(known) for known in amounts if known),
+        _RATES: len(rates) > 1 and any(e.interval for e in differences if e.measure.name in moving),
+        _UNITS: any(each.incomparable for each in differences),
+        _FEW: fewest < 20,
     }
-    return {TEXTS["cautions"][name]: each for name, each in holds.items()}
+
+
+_NO_POLICIES = (
+    "No evaluations were given: nothing here says from which data policies learn more. Quality metrics"
+    " describe data and have often misjudged that."
+)
+_RATES = "Frame rates differ: smoothness and idle time are only roughly comparable."
+_UNITS = "Some metrics are not compared, because their units may differ: the report has a table of them."
+_FEW = "A group has fewer than 20 episodes: intervals of means are rough."
+_FEW_SEEDS = "Fewer than 5 training seeds of a condition: the seed alone moves success by 10 to 15 points."
+_ONE_DRAW = "One draw of each dataset: how much another recording would differ is not in the intervals."
+_NO_PAIRS = "Training or evaluation seeds differ between conditions: rollouts were not compared as pairs."
+_AMOUNTS = "The policies were trained on different amounts of data, which alone can make them differ."

@@ -11,14 +11,33 @@ from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.headline import cautions, headline
 from handrail.datasets.comparison.pictures import first_pictures
 from handrail.datasets.comparison.policies import Outcomes
-from handrail.datasets.comparison.report import TEXTS, Report, contrast_table
+from handrail.datasets.comparison.report import Report, contrast_table
 from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import Panel, svg
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, duration, number, percent, percent_span, span
 
 FORMAT = "handrail.comparison/4"
-_TEXTS = TEXTS["datasets"]
+_REST = "The report has every metric, also where no difference was detected: that does not mean equal."
+_HOW = (
+    "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
+    " where the same seeds were tried under both, Boschloo's where not. Several policies in the same"
+    " scenes: “these policies” takes the scene for the unit; “with training” is the wider of a nested"
+    " bootstrap over dataset draw, training seed and evaluation seed and of Student's t over the policies"
+    " (over draws where there are several), and Welch's t test has to agree. Means of metrics: bootstrap"
+    " over episodes and permutation tests, paired by seed where every episode has one that began alike. A"
+    " metric whose unit is the dataset depends on the number of episodes: it is described at the same"
+    " number, not tested. Detected: the intervals leave zero out, p stays below 0.05 after Holm's"
+    " correction over its family. “Not detected” does not mean “equal”: “detectable” is the difference"
+    " that 80 % of such experiments detect. “Same number” and “same time” are of the first episodes of"
+    " each group; where persons took turns, the last of them may be missing. ↔: follows the length of the"
+    " episodes (Spearman's |ρ| ≥ 0.5); “same length” has that taken off by analysis of covariance."
+)
+_EFFECTS = "Filled: detected; hollow: not. An arrow: beyond the frame, or a difference where nothing varies."
+_SLOWEST = (
+    "The three of each group at the wrong end of each metric, and the command that writes the dataset without"
+    " them. The slowest episode may be the one with the hardest scene: look before you leave it out."
+)
 
 
 def dataset_report(comparison: Comparison) -> Report:
@@ -27,8 +46,7 @@ def dataset_report(comparison: Comparison) -> Report:
     detected = [each for each in view.differences if each.detected]
     policies = tables.policy_tables(outcomes) if outcomes else []
     collecting = [tables.collection_table(view), tables.collection_differences_table(comparison)]
-    columns = ("measure", "group", "difference", "95 %", "p, Holm")
-    told = contrast_table(detected, columns, caption=_TEXTS["rest"])
+    told = contrast_table(detected, ("measure", "group", "difference", "95 %", "p, Holm"), caption=_REST)
     *others, last = comparison.labels
     names, tasks = {group.info.root.name for group in view.groups}, {t for g in view.groups for t in g.tasks}
     missing = tables.missing_table(comparison)
@@ -47,10 +65,10 @@ def dataset_report(comparison: Comparison) -> Report:
             ("What was collected", collecting),
             ("Quality", _quality(comparison)),
             ("Trajectories", [_drawn(figures.trajectory_panels(comparison)), _pictures(comparison)]),
-            ("Episodes to look at first", _worst(comparison)),
+            ("Episodes to look at first", [markup.paragraph(_SLOWEST, "quiet"), *_worst(comparison)]),
             ("What does not apply, or is not comparable", [missing] if missing.rows else []),
         ],
-        how=_TEXTS["how"],
+        how=_HOW,
         values=comparison.values,
         contrasts=comparison.contrasts,
         content={
@@ -127,7 +145,7 @@ def _quality(comparison: Comparison) -> list[str | Table]:
     return [
         _legend(comparison),
         _drawn(figures.effects_panels(comparison), "wide"),
-        markup.paragraph(_TEXTS["effects"] + turned, "quiet"),
+        markup.paragraph(_EFFECTS + turned, "quiet"),
         *(tables.metrics_table(comparison, label) for label in comparison.others),
         markup.paragraph("These numbers describe data; they do not rank it. Bold: detected.", "quiet"),
         Table(("", *comparison.labels), rows),
@@ -142,7 +160,7 @@ def _pictures(comparison: Comparison) -> str:
 
 
 def _worst(comparison: Comparison) -> list[str]:
-    groups = comparison.everything.groups
-    worst = {group.label: markup.table(tables.worst_table(comparison, group)) for group in groups}
-    folded = [markup.folded(label, table) for label, table in worst.items()]
-    return [markup.paragraph(_TEXTS["slowest"], "quiet"), *folded]
+    return [
+        markup.folded(group.label, markup.table(tables.worst_table(comparison, group)))
+        for group in comparison.everything.groups
+    ]

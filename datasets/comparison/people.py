@@ -13,7 +13,7 @@ import numpy as np
 
 from handrail.controllers.errors import unknown_name
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.report import TEXTS, Report, contrast_table, values_table
+from handrail.datasets.comparison.report import Report, contrast_table, values_table
 from handrail.datasets.comparison.scores import SCORES
 from handrail.datasets.comparison.user_study import (
     MEASURES,
@@ -40,7 +40,20 @@ from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, diff
 
 FORMAT = "handrail.people/3"
 FORMS = "workload and usability"
-_TEXTS = TEXTS["people"]
+_MEANS = "Means over participants; 95 % below, by resampling participants; n: who has a value, of all."
+_CONTRASTS = "Differences within participants; p after Holm over this table; bold: detected."
+_SCRIPTED = (
+    "Scripted operators stand beside the people, over their own episodes: they are not paired with them, and"
+    " nothing is tested between the two."
+)
+_ALONE = "In some tasks people drove no other condition beside the baseline: there is nothing to compare."
+_HOW = (
+    "A participant's value is the mean over their episodes of a task in a condition. A difference is taken"
+    " within each participant, over the scenes that they met under both conditions, else of their means; then"
+    " the mean over participants. Intervals are 95 %, by a bootstrap that resamples participants. p:"
+    " permutation of the signs of the participants' differences, exact where there are few, adjusted by Holm"
+    " over each table. A difference is detected if its interval leaves zero out and p stays below 0.05."
+)
 
 Scenes = Mapping[int | None, Sequence[float]]  # values by scene
 OfPeople = Mapping[str, Scenes]  # by participant
@@ -63,10 +76,10 @@ class PeopleComparison:
         note = f"{self.study.source}. " if self.study.demo else ""
         values = [each for each in self.values if each.scope == scope]
         contrasts = [each for each in self.contrasts if each.scope == scope]
-        means = values_table(values, f"{note}{scope}", _TEXTS["means"], note=_count)
+        means = values_table(values, f"{note}{scope}", _MEANS, note=_count)
         columns = ("measure", "group", "difference", "95 %", "p, Holm", "n")
         title = f"{note}{scope}: against {self.baseline}, paired by participant"
-        differences = contrast_table(contrasts, columns, title, _TEXTS["contrasts"])
+        differences = contrast_table(contrasts, columns, title, _CONTRASTS)
         return [means, differences] if contrasts else [means]
 
 
@@ -203,8 +216,8 @@ def _limits(
         < FEWEST,
         f"Participants: {count}. Too few to detect any difference in some tables.": count >= FEWEST
         and not reach,
-        _TEXTS["scripted"]: any(not trial.participant for trial in trials),
-        _TEXTS["alone"]: not all(scopes[:-1]),
+        _SCRIPTED: any(not trial.participant for trial in trials),
+        _ALONE: not all(scopes[:-1]),
         "No scores yet: exports/scores.csv is not there.": not study.scores,
         f"Participants with scores and without an episode: {len(strangers)}.": strangers,
         f"Episodes that name neither a participant nor a script, left out: {left_out}.": left_out,
@@ -229,7 +242,7 @@ def people_report(comparison: PeopleComparison) -> Report:
         limits=comparison.limits,
         tables=tables,
         sections=[("", [table]) for table in tables],
-        how=_TEXTS["how"],
+        how=_HOW,
         content=source | content,
         values=comparison.values,
         contrasts=comparison.contrasts,

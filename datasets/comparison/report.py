@@ -1,7 +1,6 @@
 """What every comparison shows and writes: a table of contrasts, and a report as page, JSON and CSV."""
 
 import json
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,10 +26,6 @@ from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.csv_file import csv_text
 
 Rows = Sequence[Mapping[str, Any]]
-TEXTS: Mapping[str, Mapping[str, str]] = tomllib.loads(
-    (Path(__file__).parent / "texts.toml").read_text(encoding="utf-8")
-)
-"""What pages say beside their numbers."""
 
 
 def shown(value: Value, *more: str) -> Cell:

@@ -49,11 +49,14 @@ def points_span(interval: tuple[float, float] | None) -> str:
     return DASH if interval is None else f"{points(interval[0])} to {points(interval[1])}"
 
 
+def p_value(p: float) -> str:
+    """Return a p-value with its sign of comparison."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
 def p_alone(p: float | None) -> str:
     """Return a p-value for a column whose heading says p; a dash for none."""
-    if p is None:
-        return DASH
-    return "< 0.001" if p < 0.001 else f"{p:.2g}"
+    return DASH if p is None else p_value(p).removeprefix("p = ").removeprefix("p ")
 
 
 def duration(seconds: float) -> str:
