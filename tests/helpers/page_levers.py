@@ -71,18 +71,18 @@ class Pad:
         self.tap(GRIP)
 
     def tap(self, button):
-        self._button(button, True)
+        self.press(button, True)
         time.sleep(0.2)
-        self._button(button, False)
+        self.press(button, False)
+
+    def press(self, index, pressed):
+        change = "([index, state]) => Object.assign(window.pad.buttons[index], state)"
+        self._driver.page.evaluate(change, [index, {"pressed": pressed, "value": float(pressed)}])
 
     def _set(self, axes, shifted):
         self._driver.page.evaluate("(axes) => { window.pad.axes = axes; }", axes)
-        self._button(SHIFT, bool(shifted))
-        self._button(HOLD, any(axes))
-
-    def _button(self, index, pressed):
-        change = "([index, state]) => Object.assign(window.pad.buttons[index], state)"
-        self._driver.page.evaluate(change, [index, {"pressed": pressed, "value": float(pressed)}])
+        self.press(SHIFT, bool(shifted))
+        self.press(HOLD, any(axes))
 
 
 def push(levers, seconds):

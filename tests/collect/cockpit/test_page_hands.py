@@ -82,8 +82,8 @@ class TwoSticks(Two):
 
     def hold(self, axes, shifted=False):
         pad = Pad(self.driver)
-        pad._button(SHIFT, shifted)
-        pad._button(HOLD, True)
+        pad.press(SHIFT, shifted)
+        pad.press(HOLD, True)
         self.page.evaluate("(axes) => { window.pad.axes = axes; }", axes)
 
     def sticks(self, axes, shifted, *channels):
@@ -193,7 +193,7 @@ def test_two_sticks_of_a_gamepad_are_two_hands_and_its_triggers_close_grippers(t
     pad = Pad(made.driver)
     made.sticks([-0.9, -0.8, -0.7, -0.6], False, "left.vx", "left.vy", "right.vx", "right.vy")
     made.sticks([-0.9, -0.8, -0.7, -0.6], True, "left.vz", "left.wz", "right.vz", "right.wz")
-    made.moves(lambda: pad._button(HOLD, False))  # the dead-man is of both
+    made.moves(lambda: pad.press(HOLD, False))  # the dead-man is of both
     for button, grippers in zip(TRIGGERS, ((1, 0), (1, 1)), strict=True):
         pad.tap(button)
         made.grips(*grippers)
