@@ -76,4 +76,4 @@ def test_a_twist_in_a_tool_s_axes_is_turned_by_that_hand_s_own():
         said = list(ModeAction(MODES[mode], CHANNELS).action(intent, turns).values())
         twists = values[mask][: 6 * len(hands)].reshape(-1, 2, 3)
         turned = np.ravel([twist @ turns[hand].T for hand, twist in zip(hands, twists, strict=True)])
-        np.testing.assert_allclose(np.array(said, dtype=float), [*turned, 0.0, 1.0])
+        np.testing.assert_allclose(np.array(said, dtype=float), np.append(turned, [0.0, 1.0]))
