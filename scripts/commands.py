@@ -94,6 +94,21 @@ GROUPS: Mapping[str, Mapping[str, Program]] = {
                 ),
             },
         ),
+        "robot": Program(
+            "make a robot of a URDF, and check its description",
+            {
+                "new": Verb(
+                    "write the description of a robot from its URDF",
+                    "collect.robot_config:NewRobotConfig",
+                    "collect.commands.robot:new_robot",
+                ),
+                "check": Verb(
+                    "say what is wrong with a robot's description, and draw it",
+                    "collect.robot_config:CheckRobotConfig",
+                    "collect.commands.robot:check_robot",
+                ),
+            },
+        ),
         "lekiwi": Program(
             "a LeKiwi on the network",
             {

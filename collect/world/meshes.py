@@ -1,4 +1,4 @@
-"""The arm's meshes as a camera sees them: STL files, coloured as the URDF says, or by their pieces' form."""
+"""The arm's meshes as a camera sees them, coloured as the URDF says, or by their pieces' form."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.modelling.clouds import triangles_of
 from handrail.controllers.regular_file import open_regular
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.parts import Arm
@@ -43,7 +44,10 @@ class PlacedMesh:
 
 
 def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
-    """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file."""
+    """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file.
+
+    A body that has none is drawn by its visual ones.
+    """
     for arm in model.description.arms:
         yield from _of_arm(model, arm)
 
@@ -62,20 +66,30 @@ def _of_arm(model: RobotModel, described: Arm) -> Iterator[PlacedMesh]:
     except (ValueError, RuntimeError) as error:
         raise HandrailError(f"URDF {described.urdf}: {message_of(error)}") from error
     colours = {item.meshPath: tuple(map(float, item.meshColor)) for item in seen.geometryObjects}
-    for item in geometry.geometryObjects:
-        path = Path(item.meshPath)
-        if not path.is_file():
-            continue  # a primitive, such as the marker box on the UR's ee_link
-        link = arm.frames[item.parentFrame]
-        frame = model.pinocchio.frames[model.pinocchio.getFrameId(link.name, pin.FrameType.BODY)]
+    solid, shown = (
+        [(item, _frame(model, arm, item)) for item in each.geometryObjects if Path(item.meshPath).is_file()]
+        for each in (geometry, seen)
+    )  # without primitives, such as the marker box on the UR's ee_link
+    bodies = {frame.parentJoint for _, frame in solid}
+    for item, frame in solid + [each for each in shown if each[1].parentJoint not in bodies]:
+        link, path = arm.frames[item.parentFrame], Path(item.meshPath)
         placement = frame.placement * (link.placement.inverse() * item.placement)
-        vertices, faces = _read_stl(path)
         rgba = colours.get(item.meshPath)
+        if path.suffix.lower() != ".stl":  # coal has scaled it
+            pieces = (MeshPiece(*_without_details(*triangles_of(item.geometry)), rgba or _JOINT),)
+            yield PlacedMesh(item.name, link.name, frame.parentJoint, placement, pieces)
+            continue
+        vertices, faces = _read_stl(path)
         if rgba is None:
             pieces = tuple(_pieces(vertices, faces, item.meshScale))
         else:
             pieces = (MeshPiece(*_without_details(vertices * item.meshScale, faces), rgba),)
         yield PlacedMesh(item.name, link.name, frame.parentJoint, placement, pieces)
+
+
+def _frame(model: RobotModel, arm: pin.Model, item: pin.GeometryObject) -> pin.Frame:
+    name = arm.frames[item.parentFrame].name
+    return model.pinocchio.frames[model.pinocchio.getFrameId(name, pin.FrameType.BODY)]
 
 
 def _without_details(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:

@@ -1,11 +1,11 @@
 """A robot is data: the description file that MuJoCo, pinocchio and CasADi are all built from."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -105,8 +105,13 @@ def load_description(robot: str | Path) -> RobotDescription:
         raise HandrailError(
             f"unknown robot {str(robot)!r}: expected a .toml file or one of {', '.join(robot_names())}"
         )
+    return described(read_toml(path, "robot description"), path)
+
+
+def described(tables: Mapping[str, Any], path: Path) -> RobotDescription:
+    """Return the robot that the tables of a description file say, which lies at a path."""
     where = f"robot description {path}"
-    file = decoded(read_toml(path, "robot description"), _File, where)
+    file = decoded(tables, _File, where)
     try:
         return _described(file, path.parent)
     except HandrailError as error:

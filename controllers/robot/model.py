@@ -169,19 +169,27 @@ def _build(description: RobotDescription) -> pin.Model:
             )
         model = pin.appendModel(model, _arm(arm, description.name), model.getFrameId(arm.on), _se3(arm.mount))
     if tuple(model.names[1:]) != description.joints:
-        raise HandrailError(f"joints of robot {description.name}: expected {description.joints}")
+        expected, got = (", ".join(names) for names in (list(model.names)[1:], description.joints))
+        raise HandrailError(
+            f"joints of robot {description.name}: expected in the order {expected}; got {got}"
+        )
     for hand in description.hands:
         _add_tool(model, hand, description.name)
     return model
 
 
-def _arm(arm: Arm, robot: str) -> pin.Model:
-    """Return an arm with every joint that the description does not list locked at zero."""
+def read_urdf(arm: Arm) -> pin.Model:
+    """Return all of an arm's URDF, every joint of it free."""
     try:
         with _without_words():
-            model = pin.buildModelFromXML(urdf_text(arm))
+            return pin.buildModelFromXML(urdf_text(arm))
     except (ValueError, RuntimeError) as error:
         raise HandrailError(f"URDF {arm.urdf}: {message_of(error)}") from error
+
+
+def _arm(arm: Arm, robot: str) -> pin.Model:
+    """Return an arm with every joint that the description does not list locked at zero."""
+    model = read_urdf(arm)
     missing = set(arm.joints) - set(model.names)
     if missing:
         raise HandrailError(

@@ -1,0 +1,85 @@
+"""What a robot stands on, how large its world is, and from where its cameras look."""
+
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.modelling.clouds import LinkCloud
+from handrail.controllers.modelling.home import shoulder_place
+from handrail.controllers.robot.model import RobotModel
+
+PLACEHOLDER = {"name": "none", "frame": "planar_base", "sphere": 0.1}  # before there are shapes
+_LARGE = 0.6  # reach of a hand whose world has scale 1 [m]
+_WIDE = 0.3  # width of a base of the URDF's own, as a share of the reach
+_HEAVY = 120.0  # mass of a base at scale 1 [kg]
+_SHOULDER, _DECK, _CHASSIS, _AHEAD = 0.75, 0.28, (0.8, 0.6), 0.2  # of a base that is added, at scale 1 [m]
+_PAINT = [0.2, 0.22, 0.25]  # of such a base
+_MAST, _SEEN = np.array([-0.35, 0.0, 1.75]), np.array([1.0, 0.0, 0.7])  # of the front camera, at scale 1 [m]
+
+
+def standing(tables: dict[str, Any], model: RobotModel, clouds: list[LinkCloud], reach: float) -> list[str]:
+    """Write base, mount and world into the tables; return guesses.
+
+    Args:
+        tables: of the description; the arm is at the origin.
+        model: of these.
+        clouds: of the links.
+        reach: of a hand from its shoulder [m].
+    """
+    still = [cloud.points for cloud in clouds if cloud.joint <= len(model.description.base.joints)]
+    points = np.vstack([*still, np.zeros((1, 3))])
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    fixed, place = tables["base"]["kind"] == "fixed", tables["arm"][0]["translation"]
+    scale = round(min(reach / 1.2, 1.0), 2) if reach < _LARGE or fixed else 1.0
+    second = float(shoulder_place(model, 0, model.description.home)[2])
+    base = {"mass": _HEAVY * scale**3, "height": 0.04, "size": np.maximum(upper - lower, 0.1)[:2]}
+    if min(upper[:2] - lower[:2]) >= _WIDE * reach:
+        place[2], base["height"] = -float(lower[2]), min(float(upper[2] - lower[2]), 0.3)
+        said = "base: the URDF's own, {:.2f} × {:.2f} m".format(*base["size"])
+    elif fixed:
+        place[2], said = base["height"], "base: a plate of 4 cm on the floor"
+    else:
+        size = np.array([*_CHASSIS, _DECK]) * scale
+        base |= {"size": size[:2], "height": size[2]}
+        place[0], place[2] = _AHEAD * scale, max(_SHOULDER * scale - second, size[2])
+        width, rise = max(0.8 * float(max(upper[:2] - lower[:2])), 0.05), place[2] - size[2] - 0.01
+        tables["collision"].append(_box("chassis", size, [0.0, 0.0, size[2] / 2]))
+        if rise > 0.02:
+            tables["collision"].append(
+                _box("column", [width, width, rise], [place[0], 0.0, size[2] + rise / 2])
+            )
+        seen = [shape for shape in tables["collision"] if shape["name"] in ("chassis", "column")]
+        tables["visual"] = [{"rgba": _PAINT} | shape for shape in seen]
+        said = f"base: added, with chassis and column, the arm {place[2]:.2f} m above the floor"
+    goals, high = np.array([0.7, 1.0]) * scale, second + place[2]
+    if abs(high - goals.mean()) > 0.5 * reach:
+        goals = np.maximum([high - 0.4 * reach, high], 0.1 * reach)
+    cube = 0.05 * min(1.0, 2.0 * scale)
+    tables["base"] |= base
+    tables["world"] = {"scale": scale, "tables": np.array([0.55, 0.65]) * scale, "goals": goals, "cube": cube}
+    return [
+        said,
+        f"world: scale {scale} for a reach of {reach:.2f} m, goals {goals[0]:.2f} to {goals[1]:.2f} m high",
+    ]
+
+
+def cameras(model: RobotModel) -> list[dict[str, Any]]:
+    """Return one on a mast, and one beside each hand, its horizon level at home."""
+    home, scale, found = model.description.home, model.description.world.scale, []
+    if model.description.base.joints:
+        top = max(float(model.pose(home, placed.frame).position[2]) for placed in model.description.collision)
+        mast = np.maximum(_MAST * scale, [-9.0, 0.0, top + 0.4 * scale])
+        found.append({"name": "front", "frame": "planar_base", "position": mast, "looks_at": _SEEN * scale})
+    for hand in model.description.hands:
+        tool, ahead = hand.placement.translation, hand.placement.rotation[:, 2]
+        above = model.pose(home, hand.frame).rotation.T @ [0.0, 0.0, 1.0]
+        aside = above - ahead * (ahead @ above)
+        position = tool + scale * (0.12 * aside / np.linalg.norm(aside) - 0.17 * ahead)
+        view = {"position": position, "looks_at": tool + scale * 0.05 * ahead, "up": above, "fovy": 85.0}
+        found.append({"name": hand.named("wrist").replace(".", "_"), "frame": hand.frame} | view)
+    return found
+
+
+def _box(name: str, size: FloatArray | list[float], at: list[float]) -> dict[str, Any]:
+    return {"name": name, "frame": "planar_base", "box": size, "at": at}
