@@ -55,6 +55,7 @@ class Page:
         self.frame: dict[str, Any] = {}
         self.channels: list[str] = []
         self.axes: list[float] = []
+        self._grips: list[bool] = []
         self.is_driving, self.came = False, 0.0
         self.echo: float | None = None
         self.frames = self.pictures = 0
@@ -114,7 +115,7 @@ class Page:
             self.axes = [0.0] * len(self.channels)
         self._sequence += 1
         echo = self.frame["stamp"] if self.echo is None else self.echo
-        inputs = {"device": "keyboard", "grip": False, "axes": self.axes, "view": 0.0, "targets": []}
+        inputs = {"device": "keyboard", "grips": self._grips, "axes": self.axes, "view": 0.0, "targets": []}
         self.socket.send(
             json.dumps({"kind": "drive", "seq": self._sequence, "echo": echo, "on": True} | inputs)
         )
@@ -122,6 +123,7 @@ class Page:
     def _take(self, message: dict[str, Any]) -> None:
         if message["kind"] == "stage":
             self.channels = message["stage"]["channels"]
+            self._grips = [False] * len(message["stage"]["hands"])
         elif message["kind"] == "you":
             self.is_driving = message["driving"]
         elif message["kind"] == "frame":
