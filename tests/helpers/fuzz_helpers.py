@@ -84,7 +84,7 @@ class OpenGate(Gate):
     """Sends what comes: nothing but the controller keeps the limits."""
 
     def limit(self, command, q):
-        self.velocity = np.array(np.asarray(command)[:-1])
+        self.velocity = np.array(np.asarray(command)[: len(self.velocity)])
         return np.asarray(command)
 
 
@@ -92,9 +92,21 @@ class RudeOperator:
     """Full-speed, jerky, switching intents; now and then garbage, huge, stale, future, in no known frame."""
 
     def __init__(self, channels, limits, rng):
-        self._channels, self._limits, self._rng = channels, limits, rng
-        self._groups = [("ee",), ("base",), ("joint",), ("base", "ee"), ("ee.vx", "ee.vy", "ee.vz"), ()]
+        self._channels, self._rng = channels, rng
+        self._groups = [("ee",), ("base",), ("joint",), ("base", "ee"), channels.hands[0][:3], ()]
         self._groups.append((channels.joints[-3],))
+        if channels.pair:
+            self._groups += [
+                ("left",),
+                ("right",),
+                ("pair",),
+                ("pair", "apart"),
+                ("base", "left", "right.arm"),
+            ]
+        hand = [1, 1, 1, 2, 2, 2]
+        pair = [*hand, 1] if channels.pair else []
+        self._full = np.concatenate([[1, 1, 0.4], hand * len(channels.hands), pair, limits.velocity])
+        self._grippers = (0.0,) * len(channels.hands)
         self._until = 0.0
 
     def intent(self, time):
@@ -106,8 +118,7 @@ class RudeOperator:
                 if rng.random() < 0.8
                 else (rng.random(size) < 0.4)
             )
-            full = np.concatenate([[1, 1, 0.4], [1, 1, 1, 2, 2, 2], self._limits.velocity])
-            self._values = full * rng.choice([-1.0, 1.0, 0.0, 0.5], size)
+            self._values = self._full * rng.choice([-1.0, 1.0, 0.0, 0.5], size)
             self._frames = Frames(
                 rng.choice(["base", "world"]), rng.choice(["world", "tool"]), rng.uniform(-0.3, 0.3, 3)
             )
@@ -131,7 +142,7 @@ class RudeOperator:
             values, mask = np.zeros(3), np.zeros(3, dtype=bool)
         elif trouble < 0.20:
             values = values + rng.normal(0, 0.5, size)
-        return Intent(values, mask, time=stamp, frames=frames)
+        return Intent(values, mask, self._grippers, time=stamp, frames=frames)
 
 
 @contextmanager
@@ -186,7 +197,7 @@ def run(
         excess = np.abs(velocity - previous) / (limits.acceleration * PERIOD) - 1.0
         result.acceleration_excess = max(result.acceleration_excess, float(np.max(excess)))
         previous = velocity
-        simulation.send(np.append(velocity, 0.0))
+        simulation.send(np.append(velocity, np.zeros(len(model.description.hands))))
         for pair in simulation.contacts:
             met = set(pair.split(" – "))
             kind = result.moving if met & moving else result.standing if met & standing else result.own

@@ -14,7 +14,7 @@ VERBS = {
     for name, command in COMMANDS.items()
     for verb, each in command.verbs.items()
 }
-BENCH_CONFIGS = {f"bench {name}": bench.settings for name, bench in BENCHES.items()}
+BENCH_CONFIGS = {f"bench {name}": bench.config for name, bench in BENCHES.items()}
 COMMAND_CONFIGS = {name: verb.config for name, verb in VERBS.items()}
 CONFIGS = COMMAND_CONFIGS | BENCH_CONFIGS
 

@@ -141,7 +141,7 @@ def test_a_metric_of_an_installed_package_is_in_the_report(recorded, tmp_path):
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--task", "press"], "unknown task 'press': expected one of drawer, pick_place, reach, tray"),
+        (["--task", "press"], "unknown task 'press': expected one of carry_box, drawer"),
         (["--task", "nowhere.press:PRESS"], "task nowhere.press:PRESS: cannot import it: No module named"),
         (["--task", "press_kit:PULL"], "task press_kit:PULL: cannot import it: module 'press_kit' has no"),
         (["--task", "press_kit:HAND"], "task press_kit:HAND: expected a TaskSpec, got a TeleopMode"),

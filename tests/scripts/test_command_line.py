@@ -30,6 +30,7 @@ NEEDED = {
     "handrail-compare": ["x"],
     "handrail-edit merge": ["x", "y"],
     "handrail-devices test": ["keyboard"],
+    "handrail-robot new": ["x"],
     "handrail-user-study": ["status", "x"],
 }
 LISTS = [get_args(kind)[1] for kind in (Names, Numbers, Words)]

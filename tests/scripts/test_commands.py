@@ -38,7 +38,7 @@ def recorded():
 
 
 WRONG = {
-    "task": (["--task", "juggle"], "unknown task 'juggle': expected one of drawer, pick_place, reach, tray"),
+    "task": (["--task", "juggle"], "unknown task 'juggle': expected one of carry_box, drawer"),
     "mode": (["--mode", "telepathy"], "unknown mode 'telepathy': expected one of base"),
     "operator": (["--operator", "cat"], "unknown operator 'cat'"),
     "camera": (["--cameras", "wrist,roof"], "unknown camera 'roof'"),
