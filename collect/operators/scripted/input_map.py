@@ -102,6 +102,8 @@ class InputMap(ABC):
         self._model, self._gains = model, gains
         self._base = len(self.channels.base)
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
+        moved = np.sum([self.channels.moving(hand) for hand in range(len(self.channels.hands))], axis=0)
+        self._used = (moved < 2) | (np.arange(model.size) < self._base)  # a torso is slow: it is left alone
         hand, base = gains.full[:6], gains.full[6:][: self._base]
         joints = np.concatenate([base, np.full(model.size - self._base, gains.joint_rate)])
         twists = [hand] * len(self.channels.hands) + ([hand, hand[:1]] if self.channels.pair else [])
@@ -190,7 +192,7 @@ class StickMap(InputMap):
         weights = np.full(size, _DAMPING) / self._model.description.limits.velocity
         posture = _POSTURE * np.any([*twists.values()]) * np.eye(size)[self._base :]
         tools = (self._model.description.hands[hand].named("tool") for hand in twists)
-        rows = [*(self._model.jacobian(q, tool) for tool in tools), np.diag(weights), posture]
+        rows = [*(self._model.jacobian(q, tool) * self._used for tool in tools), np.diag(weights), posture]
         targets = [*twists.values(), np.zeros(size), posture @ (_RETURN * home)]
         if len(base):
             rows.append(_BASE_WEIGHT * np.eye(len(base), size))
