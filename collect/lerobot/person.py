@@ -6,6 +6,7 @@ While they do not steer, the robot brakes and time stands still. LeRobot's own k
 """
 
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 from handrail.collect.cockpit.cockpit import Cockpit, check_installed
@@ -66,4 +67,6 @@ class HandrailGamepad(SimTeleoperator):
         robot.env.render_mode = "rgb_array"
         said = {each.name: getattr(robot.session, each.name) for each in fields(SessionConfig)}
         config = replace(RecordConfig(**said, teleop=self._settings), operator="gamepad")
-        return open_device(config, robot.env, print, {robot.mode.name: robot.mode})
+        owned = partial(robot.mode.owned, hand=robot.env.model.hand.name)
+        mode = replace(robot.mode, groups=owned)  # whichever hand is chosen, its action is of this one
+        return open_device(config, robot.env, print, {mode.name: mode})

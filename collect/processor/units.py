@@ -235,7 +235,8 @@ def _in_degrees(prefix: str, base: BaseUnits | None = None) -> Callable[[RobotDe
 def _bi_so_follower(description: RobotDescription) -> UnitsTable:
     joints = {name: JointUnits(name) for name in description.arm_joints}
     grippers = (hand.name for hand in description.hands)
-    return UnitsTable(joints, None, None, {n: GripperUnits(f"{n}_gripper.pos", _OPEN, 0.0) for n in grippers})
+    own = {name: GripperUnits(f"{name}_gripper.pos", _OPEN, 0.0) for name in grippers}
+    return UnitsTable(joints, BaseUnits() if description.base.joints else None, None, own)
 
 
 def _bi_openarm_follower(description: RobotDescription) -> UnitsTable:

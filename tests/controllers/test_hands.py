@@ -16,8 +16,6 @@ from handrail.controllers.objectives.hold import end_effector_hold
 from handrail.controllers.objectives.ownership import leaves_freedom, steered_joints
 from handrail.controllers.objectives.together import together, together_parameters
 from handrail.controllers.objectives.tray import tray_levelling
-from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.controllers.robot.description import load_description
 from handrail.controllers.robot.model import load_model
 
 FILE = Path(__file__).parents[2] / "docs" / "examples" / "tiago_pro.toml"
@@ -181,40 +179,12 @@ def test_hands_that_make_no_sense_are_refused(tmp_path, old, new, told):
         load_model(tmp_path / "robot.toml")
 
 
-TWO = """
-[[arm]]
-urdf = "example-robot-data/robots/so_arm_description/urdf/so101.urdf"
-prefix = "{0}_"
-translation = [0.0, {1}, 0.0975]
-joints = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
-
-[[hand]]
-name = "{0}"
-frame = "{0}_gripper_frame_link"
-"""
-
-
-def test_two_arms_come_from_one_urdf(tmp_path):
+def test_two_arms_come_from_one_urdf():
     """Each with a prefix; the robot has the joints of both, and each hand is where its arm has it."""
-    one = load_description("lekiwi")
-    shared, joints = ROBOTS.find("lekiwi").file.read_text(), len(one.base.joints)
-
-    def twice(values):
-        return [*values[:joints], *values[joints:], *values[joints:]]
-
-    limits = "\n".join(f"{name} = {twice(values.tolist())}" for name, values in vars(one.limits).items())
-    (tmp_path / "two.toml").write_text(
-        shared[shared.index("[base]") : shared.index("[[arm]]")].join(['name = "two"\n', ""])
-        + TWO.format("left", 0.15)
-        + TWO.format("right", -0.15)
-        + f"[home]\nq = {twice(one.home.tolist())}\n[limits]\n{limits}\n"
-        + '[[collision]]\nname = "chassis"\nframe = "planar_base"\nbox = [0.3, 0.3, 0.09]\n'
-        + "[self_collision]\npairs = []\n"
-    )
-    model = load_model(tmp_path / "two.toml")
+    model = load_model("bi_so101")
     assert model.joints[3:5] == ("left_shoulder_pan", "left_shoulder_lift")
-    assert model.size == 13
+    assert model.size == 15
     q = model.description.home
     left, right = (model.pose(q, f"{hand}.tool").position for hand in ("left", "right"))
-    np.testing.assert_allclose(left - right, [0.0, 0.3, 0.0], atol=1e-9)
+    np.testing.assert_allclose(left - right, [0.0, 0.17, 0.0], atol=1e-9)
     assert [sum(each) for each in model.description.moves] == [8, 8]

@@ -48,7 +48,7 @@ export class Panels {
       made.className = `hand-${index}`;
       return made;
     });
-    byId("hand").hidden = stage.hands.length < 2;
+    byId("hand").hidden = stage.hands.length < 2 || stage.refuses.includes("hand");
     byId("hands").replaceChildren(...this.hands);
     this.locks(stage);
     this.pictures(stage.cameras);

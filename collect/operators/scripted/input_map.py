@@ -97,7 +97,7 @@ class InputMap(ABC):
 
     def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
         self.mode = mode
-        self._masks: dict[tuple[Focus, int | None], BoolArray] = {}
+        self._masks: dict[Focus, BoolArray] = {}
         self.channels = Channels.of(model.description)
         self._model, self._gains = model, gains
         self._base = len(self.channels.base)
@@ -142,16 +142,15 @@ class StickMap(InputMap):
         if self.mask("hand")[self.channels.joint_slice].any():
             self._turn = LargeTurn(self._model, self._gains, view)
 
-    def mask(self, focus: Focus, hand: int | None = None) -> BoolArray:
-        """Return the channels that the operator owns, (m,), where they attend to a hand."""
-        if (focus, hand) not in self._masks:
-            meant = self._model.hand if hand is None else self._model.description.hands[hand]
-            self._masks[focus, hand] = self.channels.mask(*self.mode.owned(focus, meant.name))
-        return self._masks[focus, hand]
+    def mask(self, focus: Focus) -> BoolArray:
+        """Return the channels that the operator owns, (m,)."""
+        if focus not in self._masks:
+            self._masks[focus] = self.channels.mask(*self.mode.owned(focus, self._model.hand.name))
+        return self._masks[focus]
 
     def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask, and the goal on every channel of the mode, within full stick, (m,)."""
-        mask = self.mask(goal.focus, goal.hand_number)
+        mask = self.mask(goal.focus)
         values = np.zeros(self.channels.size)
         values[self.channels.base_slice] = goal.base[: self._base]
         for hand, twist in self._twists(goal, state.q).items():
@@ -163,18 +162,13 @@ class StickMap(InputMap):
         return mask, np.minimum(np.maximum(np.where(mask, values, 0.0), -self.full), self.full)
 
     def _twists(self, goal: MotionGoal, q: FloatArray) -> dict[int, FloatArray]:
-        """Return what is wanted of hands, by number: of each of a pair what brings it to its own place.
-
-        A task of several hands wants the others to stay where they are.
-        """
-        target, hands = goal.target, self._model.description.hands
+        """Return what is wanted of hands, by number: of each of a pair what brings it to its own place."""
+        target = goal.target
         if target is not None and target.apart:
-            tools = [self._model.pose(q, hand.named("tool")) for hand in hands]
+            tools = [self._model.pose(q, hand.named("tool")) for hand in self._model.description.hands]
             pairs = zip(tools, target.of_hands(tools), strict=True)
             return dict(enumerate(hand_twist(tool, place, self._gains, target.pace) for tool, place in pairs))
-        if goal.hand_number is None:
-            return {self._model.number: goal.hand}
-        return {hand: goal.hand * (hand == goal.hand_number) for hand in range(len(hands))}
+        return {self._model.number: goal.hand}
 
     def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return what the expert makes of a goal on all joints, (n,), within full stick."""

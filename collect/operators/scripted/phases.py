@@ -34,7 +34,6 @@ class ScriptPhase(Target):
     name: str = ""  # what it is, for whoever plans anew after it
     focus: Focus = "hand"  # which of the two ends the phase, and is steered in switching mode
     gripper: float = 0.0  # 0 open, 1 closed
-    grippers: tuple[float, ...] = ()  # of each hand, where they differ
     beside: float = 0.0  # `distance` across the tool's axis, where more is good enough there [m]
     dwell: float = 0.0  # time to wait, hands still, before the next phase [s]
     patience: float = np.inf  # time after which the operator goes on anyway [s]
@@ -93,14 +92,12 @@ class PhasedScript(ABC):
         """Return what is wanted now, and go to the next phase when this one is done."""
         self._advance(view)
         phase, hands = self._phases[0], len(self._model.description.hands)
-        grippers = phase.grippers or (phase.gripper,) * (hands if phase.apart else 0)
+        grippers = (phase.gripper,) * (hands if phase.apart else 0)
         if self._reached_at is not None:
-            rest = MotionGoal.rest(phase.focus, phase.gripper)
-            return replace(rest, grippers=grippers, hand_number=phase.hand_number)
+            return replace(MotionGoal.rest(phase.focus, phase.gripper), grippers=grippers)
         hand = hand_twist(phase.steered(view.task), phase.hand, self._gains, phase.pace)
         base = base_twist(view.state.q, phase.base, self._gains)
-        said = phase.focus, phase.gripper, phase, grippers, phase.hand_number
-        return MotionGoal(hand, base, *said)
+        return MotionGoal(hand, base, phase.focus, phase.gripper, phase, grippers)
 
     def _advance(self, view: View) -> None:
         phase, time = self._phases[0], view.state.time

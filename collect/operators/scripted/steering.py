@@ -28,7 +28,6 @@ class Target:
     angle: float = 0.2  # the same for orientation [rad]
     pace: float = 1.0  # share of the full stick
     tilt: float = np.inf  # how far the hand may lean from the pose's axis on the way there [rad]
-    hand_number: int | None = None  # which hand is steered there; None: that does the task
     apart: float = 0.0
     """Between two hands that are steered as a pair, along their common y [m], where the pose is half-way; 0:
     one is steered."""
@@ -37,9 +36,7 @@ class Target:
 
     def steered(self, task: TaskState) -> Pose:
         """Return where what is steered is now: a hand's tool, or what is half-way between two."""
-        if self.apart:
-            return task.pair
-        return task.tool if self.hand_number is None else task.tools[self.hand_number]
+        return task.pair if self.apart else task.tool
 
     def of_hands(self, tools: Sequence[Pose]) -> list[Pose]:
         """Return where the hands of a pair belong, on the sides where their tools are now."""
@@ -64,7 +61,6 @@ class MotionGoal:
     gripper: float = 0.0  # 0 open, 1 closed
     target: Target | None = None  # where that leads; None wants to rest
     grippers: tuple[float, ...] = ()  # of each hand, where a task is of several; then `gripper` means nothing
-    hand_number: int | None = None  # which hand they attend to; None: that does the task
 
     @classmethod
     def rest(cls, focus: Focus = "hand", gripper: float = 0.0) -> "MotionGoal":

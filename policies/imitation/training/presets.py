@@ -83,8 +83,7 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     settings = {key: value for key, value in wanted.items() if key in known} | dict(sizes.options)
     try:
         policy: Any = draccus.decode(choices[config.policy], settings)
-    # LeRobot's ACT raises NotImplementedError at averaging with more than one action a look
-    except (draccus.utils.ParsingError, ValueError, TypeError, NotImplementedError) as error:
+    except (draccus.utils.ParsingError, ValueError, TypeError, RuntimeError) as error:  # policies' own
         cause = error if isinstance(error, draccus.utils.DecodingError) else error.__cause__ or error
         raise HandrailError(f"policy {config.policy}: {message_of(cause)}") from error
     mapping = policy.normalization_mapping

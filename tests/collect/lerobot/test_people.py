@@ -89,3 +89,22 @@ def test_a_person_with_a_gamepad_drives(robot, pad, tmp_path):
         until(robot, teleop, lambda action: NEXT in action)
     finally:
         teleop.disconnect()
+
+
+def test_a_gamepad_steers_the_hand_of_the_action_whichever_is_chosen(pad, tmp_path):
+    robot = HandrailSim(
+        HandrailSimConfig(robot="bi_so101", task="reach", hand="right", calibration_dir=tmp_path)
+    )
+    teleop = HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))
+    teleop.connect()
+    robot.connect()
+    try:
+        assert until(robot, teleop, lambda action: HOLD in action)
+        for control in ("a", "left_shoulder", "start"):  # `a` is the other hand
+            pad.move(control, 1)
+        until(robot, teleop, lambda action: HOLD not in action)
+        pad.move("left_y", -1.0)
+        until(robot, teleop, lambda action: abs(action["right.x.vel"]) > 0.02)
+    finally:
+        teleop.disconnect()
+        robot.disconnect()

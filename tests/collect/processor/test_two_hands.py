@@ -110,6 +110,11 @@ def test_units_of_lerobot_s_two_armed_robots(tmp_path, units):
     assert known.read({name: value for name, value in said.items() if name != "right_gripper.pos"}) is None
 
 
+def test_two_arms_on_a_base_add_its_velocities_and_the_head():
+    names = robot_units("bi_so_follower", load_description("bi_so101")).action_names
+    assert {"left_elbow_flex.pos", "right_gripper.pos", "head_pan.pos", "x.vel", "theta.vel"} < set(names)
+
+
 def test_units_of_reachy2_are_its_names():
     from dataclasses import replace
 
