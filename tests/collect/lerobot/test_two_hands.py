@@ -1,7 +1,5 @@
 """LeRobot's plugins with two hands: names by one rule, and the hand that is told does the task."""
 
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
@@ -20,7 +18,7 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.description import load_description
 
-ROBOT = str(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
+ROBOT = "tiago_pro"
 CHANNELS = Channels.of(load_description(ROBOT))
 GRIPPERS = ("left.gripper.pos", "right.gripper.pos")
 

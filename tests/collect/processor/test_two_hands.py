@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import load_description
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
-TIAGO, HANDS = str(EXAMPLES / "tiago_pro.toml"), ("left", "right")
+TIAGO, HANDS = "tiago_pro", ("left", "right")
 AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 ARM = """

@@ -1,7 +1,5 @@
 """Tasks of two hands: a scripted person does them in each mode that fits; a pair stays together."""
 
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 
-ROBOT = str(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
+ROBOT = "tiago_pro"
 
 
 SPEED = 0.08  # of the base [m/s]

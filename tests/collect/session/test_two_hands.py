@@ -1,7 +1,5 @@
 """A robot with two hands does tasks with either; each grasps for itself, and a recording names both."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from handrail.collect.world.observation import from_numbers, to_numbers
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 
-ROBOT = str(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
+ROBOT = "tiago_pro"
 TOOLS = ("left.tool", "right.tool")
 
 

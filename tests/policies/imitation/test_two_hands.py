@@ -1,7 +1,5 @@
 """Policies of robots with two hands: each hand sees for itself, and what they write is each hand's own."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -16,7 +14,7 @@ from handrail.policies.imitation.interface.checkpoint import MIXED, PolicyMeta, 
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import CompletedRobot, Completion
 
-TIAGO = load_description(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
+TIAGO = load_description("tiago_pro")
 CHANNELS, JOINTS, N = Channels.of(TIAGO), TIAGO.joints, len(TIAGO.joints)
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 HANDS = ("left", "right")
