@@ -177,8 +177,8 @@ def main(config: SpeedConfig) -> int:
     """Measure, print the tables and draw the picture beside the JSON."""
     console = Terminal()
     rows = measure(config, console)
-    picture = Path(config.json).expanduser().with_suffix(".png")
     if config.json and config.degrees and config.pairs and config.horizons:
+        picture = Path(config.json).expanduser().with_suffix(".png")
         write_whole(picture, png(speed_figure(rows, config)))
         console.print(f"Written: {picture}")
     report("speed", config, speed_tables(rows, config))
