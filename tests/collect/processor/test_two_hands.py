@@ -1,10 +1,19 @@
 """The processor step with two hands: each is steered by its name; units are those of LeRobot's robots."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from lerobot.robots import make_robot_from_config
+from lerobot.robots.bi_openarm_follower import BiOpenArmFollowerConfig
+from lerobot.robots.bi_so_follower import BiSOFollowerConfig
+from lerobot.robots.openarm_follower import openarm_follower
+from lerobot.robots.openarm_follower.config_openarm_follower import OpenArmFollowerConfigBase
+from lerobot.robots.reachy2 import Reachy2RobotConfig, robot_reachy2
+from lerobot.robots.so_follower import SOFollowerConfig
 from processor_helpers import PERIOD, Drive
 
 from handrail.collect.processor.units import robot_units
@@ -13,33 +22,52 @@ from handrail.controllers.robot.description import load_description
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 TIAGO, HANDS = "tiago_pro", ("left", "right")
+PANDA = EXAMPLES.parents[1] / "controllers" / "robot" / "robots" / "ridgeback_panda.toml"
 AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 ARM = """
 [[arm]]
-urdf = "example-robot-data/robots/so_arm_description/urdf/so101.urdf"
-prefix = "{0}_"
-translation = [0.0, {1}, 0.04]
-joints = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
+urdf = "{urdf}"
+prefix = "{name}_"
+translation = [0.0, {y}, 0.04]
+joints = {joints}
 [[hand]]
-name = "{0}"
-frame = "{0}_gripper_frame_link"
+name = "{name}"
+frame = "{name}_{frame}"
 """
 
 
-def bi_so101(folder: Path):
-    """Return two SO-101 beside each other on a table."""
-    one = tomllib.loads((EXAMPLES / "so101.toml").read_text())
-    limits = "\n".join(f"{name} = {values * 2}" for name, values in one["limits"].items())
+def two(folder: Path, file=EXAMPLES / "so101.toml"):
+    """Return two arms of a robot beside each other on a table."""
+    one = tomllib.loads(file.read_text())
+    arm, frame = one["arm"][0], one["hand"][0]["frame"]
+    n = len(arm["joints"])
+    limits = "\n".join(f"{name} = {values[-n:] * 2}" for name, values in one["limits"].items())
+    own = {"urdf": arm["urdf"], "joints": arm["joints"], "frame": frame}
     (folder / "two.toml").write_text(
         'name = "two"\n[base]\nkind = "fixed"\nmass = 1.0\nheight = 0.04\nsize = [0.1, 0.4]\n'
-        + ARM.format("left", 0.15)
-        + ARM.format("right", -0.15)
-        + f"[home]\nq = {one['home']['q'] * 2}\n[limits]\n{limits}\n"
-        + '[[collision]]\nname = "plate"\nframe = "left_base_link"\nsphere = 0.01\n'
+        + ARM.format(name="left", y=0.15, **own)
+        + ARM.format(name="right", y=-0.15, **own)
+        + f"[home]\nq = {one['home']['q'][-n:] * 2}\n[limits]\n{limits}\n"
+        + f'[[collision]]\nname = "plate"\nframe = "left_{frame}"\nsphere = 0.01\n'
         + "[self_collision]\npairs = []\n"
     )
     return load_description(folder / "two.toml")
+
+
+def two_pandas(folder: Path):
+    """Return two arms of seven joints, as OpenArm's are."""
+    return two(folder, PANDA)
+
+
+def reachy2(_):
+    """Return a mobile robot with LeRobot's joints of a Reachy 2; other bodies carry them."""
+    joints = robot_reachy2.REACHY2_L_ARM_JOINTS | robot_reachy2.REACHY2_R_ARM_JOINTS
+    joints |= robot_reachy2.REACHY2_NECK_JOINTS
+    names = tuple(name.removesuffix(".pos") for name in joints if "gripper" not in name)
+    tiago = load_description(TIAGO)
+    limits = type(tiago.limits)(**{name: each[:20] for name, each in vars(tiago.limits).items()})
+    return replace(tiago, arms=(replace(tiago.arms[0], joints=names),), home=tiago.home[:20], limits=limits)
 
 
 def ahead(hand, speed):
@@ -87,56 +115,42 @@ def test_each_hand_goes_and_closes_as_it_is_told_and_a_pair_stays_together():
     assert drive.step.counts == {"invalid_intent": 1}
 
 
-@pytest.mark.parametrize("units", ["bi_so_follower", "bi_openarm_follower"])
-def test_units_of_lerobot_s_two_armed_robots(tmp_path, units):
-    """The names are LeRobot's; what is said and read again is the same, each hand's gripper by itself."""
-    from lerobot.robots.openarm_follower.config_openarm_follower import LEFT_DEFAULT_JOINTS_LIMITS
+def arms(config, arm):
+    return config(left_arm_config=arm("a"), right_arm_config=arm("b"))
 
-    description = bi_so101(tmp_path)
-    known = robot_units(units, description)
-    joints = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
-    if units == "bi_openarm_follower":
-        joints = list(LEFT_DEFAULT_JOINTS_LIMITS)[: len(joints)]
-    names = [f"{hand}_{joint}.pos" for hand in HANDS for joint in joints]
-    assert known.action_names == (*names, "left_gripper.pos", "right_gripper.pos")
-    q = description.home + 0.1
-    said = known.action(q, np.zeros(10), np.zeros(3), (0.25, 1.0))
+
+@pytest.mark.parametrize(
+    ("units", "description", "config", "opened"),
+    [
+        ("bi_so_follower", two, arms(BiSOFollowerConfig, SOFollowerConfig), 35.0),
+        ("bi_openarm_follower", two_pandas, arms(BiOpenArmFollowerConfig, OpenArmFollowerConfigBase), -65.0),
+        ("reachy2", reachy2, Reachy2RobotConfig(with_antennas=False), 130.0),
+    ],
+)
+def test_units_of_lerobot_s_two_armed_robots(tmp_path, monkeypatch, units, description, config, opened):
+    """The names are those of LeRobot's own robots; what is said and read again is the same."""
+    monkeypatch.setattr(openarm_follower, "DamiaoMotorsBus", SimpleNamespace)  # asks for drivers
+    monkeypatch.setattr(robot_reachy2, "require_package", lambda *_, **__: None)
+    theirs = make_robot_from_config(config)
+    robot = description(tmp_path)
+    known = robot_units(units, robot)
+    assert set(known.action_names) == set(theirs.action_features)
+    assert set(known.observation_names) == set(theirs.observation_features)
+    q = robot.home[len(robot.base.joints) :] + 0.1
+    said = known.action(q, np.zeros(len(q)), np.array([0.1, 0.0, 0.2]), (0.25, 1.0))
     reading = known.read(said)
     np.testing.assert_allclose(reading.arm, q)
     np.testing.assert_allclose(reading.openings, [0.75, 0.0])
-    assert said[names[0]] == pytest.approx(np.degrees(q[0]))
-    opened = {"bi_so_follower": 35.0, "bi_openarm_follower": LEFT_DEFAULT_JOINTS_LIMITS["gripper"][0]}
-    assert said["left_gripper.pos"] == pytest.approx(0.75 * opened[units])
-    assert known.read({name: value for name, value in said.items() if name != "right_gripper.pos"}) is None
+    assert said[known.positions[0]] == pytest.approx(np.degrees(q[0]))
+    closed = [said[each.name] for each in known.grippers]
+    np.testing.assert_allclose(closed, [0.75 * opened, 0.0])
+    assert said.get("mobile_base.vtheta", np.degrees(0.2)) == pytest.approx(np.degrees(0.2))
+    assert known.read({name: value for name, value in said.items() if name != known.grippers[1].name}) is None
 
 
 def test_two_arms_on_a_base_add_its_velocities_and_the_head():
     names = robot_units("bi_so_follower", load_description("bi_so101")).action_names
     assert {"left_elbow_flex.pos", "right_gripper.pos", "head_pan.pos", "x.vel", "theta.vel"} < set(names)
-
-
-def test_units_of_reachy2_are_its_names():
-    from dataclasses import replace
-
-    from lerobot.robots.reachy2.robot_reachy2 import (
-        REACHY2_L_ARM_JOINTS,
-        REACHY2_NECK_JOINTS,
-        REACHY2_R_ARM_JOINTS,
-        REACHY2_VEL,
-    )
-
-    arms = [*REACHY2_L_ARM_JOINTS, *REACHY2_R_ARM_JOINTS]
-    joints = [name.removesuffix(".pos") for name in (*arms, *REACHY2_NECK_JOINTS) if "gripper" not in name]
-    tiago = load_description(TIAGO)
-    limits = type(tiago.limits)(**{name: each[:20] for name, each in vars(tiago.limits).items()})
-    description = replace(
-        tiago, arms=(replace(tiago.arms[0], joints=tuple(joints)),), home=tiago.home[:20], limits=limits
-    )
-    known = robot_units("reachy2", description)
-    assert set(known.action_names) == {*arms, *REACHY2_NECK_JOINTS, *REACHY2_VEL}
-    said = known.action(np.full(17, 0.5), np.zeros(17), np.array([0.1, 0.0, 0.2]), (0.0, 1.0))
-    assert said["mobile_base.vtheta"] == pytest.approx(np.degrees(0.2))
-    assert (said["l_gripper.pos"], said["r_gripper.pos"]) == (130.0, 0.0)
 
 
 GRIPPER = {"name": "g", "opened": 1, "closed": 0}
@@ -151,6 +165,6 @@ GRIPPER = {"name": "g", "opened": 1, "closed": 0}
     ],
 )
 def test_grippers_that_are_nobody_s_are_refused(tmp_path, table, hands, words):
-    description = bi_so101(tmp_path) if hands == 2 else load_description(EXAMPLES / "so101.toml")
+    description = two(tmp_path) if hands == 2 else load_description(EXAMPLES / "so101.toml")
     with pytest.raises(HandrailError, match=words):
         robot_units({"joints": {}} | table, description)
