@@ -31,9 +31,10 @@ def new_robot(config: NewRobotConfig) -> int:
     write_whole(path, f"{_HEAD}{guesses}{toml_text(made.tables)}".encode())
     for guess in made.guesses:
         say(f"look at  {guess}")
-    robot = made.model.description
+    model = made.model()
+    robot = model.description
     say(
-        f"wrote {path} in {time.monotonic() - began:.0f} s: {made.model.size} degrees of freedom, "
+        f"wrote {path} in {time.monotonic() - began:.0f} s: {model.size} degrees of freedom, "
         f"{len(robot.collision)} shapes, {len(robot.self_pairs)} pairs that can meet; "
         f"next: handrail-robot check {path} --picture robot.png"
     )

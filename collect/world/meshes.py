@@ -10,12 +10,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.errors import HandrailError, message_of
-from handrail.controllers.modelling.clouds import triangles_of
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.modelling.clouds import body_frame, geometry_models, triangles_of
 from handrail.controllers.regular_file import open_regular
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import RobotModel, read_urdf
 from handrail.controllers.robot.parts import Arm
-from handrail.controllers.robot.urdf import mesh_files, urdf_text
+from handrail.controllers.robot.urdf import mesh_files
 
 _TUBE, _JOINT, _CAP = (0.80, 0.81, 0.83, 1.0), (0.42, 0.44, 0.47, 1.0), (0.32, 0.56, 0.76, 1.0)
 _GRID, _FINE = 2e-3, 10_000  # a mesh of more triangles is drawn with its vertices on a grid [m]
@@ -56,18 +56,14 @@ def _of_arm(model: RobotModel, described: Arm) -> Iterator[PlacedMesh]:
     for path in mesh_files(described.urdf, described.mesh_root):
         if path.suffix.lower() == ".stl":
             _corners(path)
-    text, folders = urdf_text(described), [str(described.mesh_root)]
-    arm = pin.buildModelFromXML(text)
-    try:
-        geometry, seen = (
-            pin.buildGeomFromUrdfString(arm, text, kind, package_dirs=folders)
-            for kind in (pin.COLLISION, pin.VISUAL)
-        )
-    except (ValueError, RuntimeError) as error:
-        raise HandrailError(f"URDF {described.urdf}: {message_of(error)}") from error
+    arm, (geometry, seen) = read_urdf(described), geometry_models(described)
     colours = {item.meshPath: tuple(map(float, item.meshColor)) for item in seen.geometryObjects}
     solid, shown = (
-        [(item, _frame(model, arm, item)) for item in each.geometryObjects if Path(item.meshPath).is_file()]
+        [
+            (item, body_frame(model.pinocchio, arm.frames[item.parentFrame].name))
+            for item in each.geometryObjects
+            if Path(item.meshPath).is_file()
+        ]
         for each in (geometry, seen)
     )  # without primitives, such as the marker box on the UR's ee_link
     bodies = {frame.parentJoint for _, frame in solid}
@@ -85,11 +81,6 @@ def _of_arm(model: RobotModel, described: Arm) -> Iterator[PlacedMesh]:
         else:
             pieces = (MeshPiece(*_without_details(vertices * item.meshScale, faces), rgba),)
         yield PlacedMesh(item.name, link.name, frame.parentJoint, placement, pieces)
-
-
-def _frame(model: RobotModel, arm: pin.Model, item: pin.GeometryObject) -> pin.Frame:
-    name = arm.frames[item.parentFrame].name
-    return model.pinocchio.frames[model.pinocchio.getFrameId(name, pin.FrameType.BODY)]
 
 
 def _without_details(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:

@@ -10,7 +10,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.modelling.clouds import LinkCloud, link_clouds
 from handrail.controllers.modelling.home import freedom
 from handrail.controllers.modelling.limits import FASTEST
-from handrail.controllers.modelling.pairs import configurations, count_meetings, meetings, outside
+from handrail.controllers.modelling.pairs import Meetings, outside
 from handrail.controllers.robot.model import RobotModel, joints_of, load_model
 
 _SAMPLES = 2000
@@ -18,7 +18,6 @@ _OUT = 0.04  # that a link may stick out of its shapes [m]
 _OVER = 1e-3  # of a position limit beyond the URDF's [rad, m]
 _SLOWEST, _SOONEST = 5.0, 0.05  # to full velocity [s]
 _ROOM, _FREE = 0.02, 0.02  # least of a home: to a limit [rad], singular value at a reach of 1 m
-_LOOKS = 40  # configurations in which it is asked whether meshes meet
 
 
 def faults(robot: str | Path) -> list[str]:
@@ -62,28 +61,21 @@ def _of_home(model: RobotModel) -> Iterator[str]:
 
 def _of_shapes(model: RobotModel, clouds: list[LinkCloud]) -> Iterator[str]:
     for cloud in clouds:
-        own = [
-            outside(model, placed, cloud.points)
-            for placed in model.description.collision
-            if model.mount(placed)[0] == cloud.joint
-        ]
+        shapes, points = model.description.collision, cloud.triangles.reshape(-1, 3)
+        own = [outside(model, each, points) for each in shapes if model.mount(each)[0] == cloud.joint]
         out = float(np.min(own, axis=0).max()) if own else np.inf
         if out > _OUT:
-            yield f"link {cloud.link}: no collision shape encloses it" + (
-                f", it sticks out by {out:.2f} m" if own else ""
-            )
+            word = f", it sticks out by {out:.2f} m" if own else ""
+            yield f"link {cloud.link}: no collision shape encloses it{word}"
 
 
 def _of_pairs(model: RobotModel, clouds: list[LinkCloud]) -> Iterator[str]:
-    """Yield pairs whose links meet where no listed pair does, and no others always do."""
-    drawn = configurations(model, _SAMPLES, np.random.default_rng(0))
-    met, listed = (
-        meetings(model, clouds, drawn, 0.0),
-        {frozenset(pair) for pair in model.description.self_pairs},
-    )
+    """Yield pairs whose meshes meet where no listed pair does, and seldom do."""
+    met = Meetings(model, clouds, _SAMPLES)
+    listed = {frozenset(pair) for pair in model.description.self_pairs}
     known = np.array([frozenset(pair) in listed for pair in met.pairs], dtype=bool)
     clear = ~(met.distances[:, known] < 0.0).any(axis=1)
-    for index in np.flatnonzero(~known & (met.nearest < 0.0)):
-        near, pair = met.q[clear & (met.links[:, index] < 0.0)][:_LOOKS], met.pairs[index]
-        if pair not in met.always and count_meetings(model, clouds, pair, near):
-            yield f"self_collision: pairs: {pair[0]} and {pair[1]} can meet, and are not listed"
+    for index in np.flatnonzero(~known & (met.distances.min(axis=0) < 0.0)):
+        near = np.flatnonzero(clear & (met.distances[:, index] < 0.0))
+        if met.joints[index] not in met.nested and met.touching(index, near).any():
+            yield f"self_collision: pairs: {' and '.join(met.pairs[index])} can meet, and are not listed"

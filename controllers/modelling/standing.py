@@ -9,7 +9,6 @@ from handrail.controllers.modelling.clouds import LinkCloud
 from handrail.controllers.modelling.home import shoulder_place
 from handrail.controllers.robot.model import RobotModel
 
-PLACEHOLDER = {"name": "none", "frame": "planar_base", "sphere": 0.1}  # before there are shapes
 _LARGE = 0.6  # reach of a hand whose world has scale 1 [m]
 _WIDE = 0.3  # width of a base of the URDF's own, as a share of the reach
 _HEAVY = 120.0  # mass of a base at scale 1 [kg]
@@ -27,41 +26,40 @@ def standing(tables: dict[str, Any], model: RobotModel, clouds: list[LinkCloud],
         clouds: of the links.
         reach: of a hand from its shoulder [m].
     """
-    still = [cloud.points for cloud in clouds if cloud.joint <= len(model.description.base.joints)]
+    base, place = tables["base"], tables["arm"][0]["translation"]
+    base_joints = len(model.description.base.joints)
+    still = [cloud.triangles.reshape(-1, 3) for cloud in clouds if cloud.joint <= base_joints]
     points = np.vstack([*still, np.zeros((1, 3))])
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    fixed, place = tables["base"]["kind"] == "fixed", tables["arm"][0]["translation"]
+    lower, size = points.min(axis=0), np.ptp(points, axis=0)
+    fixed = base["kind"] == "fixed"
     scale = round(min(reach / 1.2, 1.0), 2) if reach < _LARGE or fixed else 1.0
     second = float(shoulder_place(model, 0, model.description.home)[2])
-    base = {"mass": _HEAVY * scale**3, "height": 0.04, "size": np.maximum(upper - lower, 0.1)[:2]}
-    if min(upper[:2] - lower[:2]) >= _WIDE * reach:
-        place[2], base["height"] = -float(lower[2]), min(float(upper[2] - lower[2]), 0.3)
+    base |= {"mass": _HEAVY * scale**3, "height": 0.04, "size": np.maximum(size, 0.1)[:2]}
+    if min(size[:2]) >= _WIDE * reach:
+        place[2], base["height"] = -float(lower[2]), min(float(size[2]), 0.3)
         said = "base: the URDF's own, {:.2f} × {:.2f} m".format(*base["size"])
     elif fixed:
         place[2], said = base["height"], "base: a plate of 4 cm on the floor"
     else:
-        size = np.array([*_CHASSIS, _DECK]) * scale
-        base |= {"size": size[:2], "height": size[2]}
-        place[0], place[2] = _AHEAD * scale, max(_SHOULDER * scale - second, size[2])
-        width, rise = max(0.8 * float(max(upper[:2] - lower[:2])), 0.05), place[2] - size[2] - 0.01
-        tables["collision"].append(_box("chassis", size, [0.0, 0.0, size[2] / 2]))
-        if rise > 0.02:
-            tables["collision"].append(
-                _box("column", [width, width, rise], [place[0], 0.0, size[2] + rise / 2])
-            )
-        seen = [shape for shape in tables["collision"] if shape["name"] in ("chassis", "column")]
+        chassis, width = np.array([*_CHASSIS, _DECK]) * scale, max(0.8 * float(max(size[:2])), 0.05)
+        base |= {"size": chassis[:2], "height": chassis[2]}
+        place[0], place[2] = _AHEAD * scale, max(_SHOULDER * scale - second, chassis[2])
+        rise = max(place[2] - chassis[2] - 0.01, 0.02)
+        column = [place[0], 0.0, chassis[2] + rise / 2]
+        seen = [
+            _box("chassis", chassis, chassis * [0.0, 0.0, 0.5]),
+            _box("column", [width, width, rise], column),
+        ]
+        tables["collision"] += seen
         tables["visual"] = [{"rgba": _PAINT} | shape for shape in seen]
         said = f"base: added, with chassis and column, the arm {place[2]:.2f} m above the floor"
     goals, high = np.array([0.7, 1.0]) * scale, second + place[2]
     if abs(high - goals.mean()) > 0.5 * reach:
         goals = np.maximum([high - 0.4 * reach, high], 0.1 * reach)
-    cube = 0.05 * min(1.0, 2.0 * scale)
-    tables["base"] |= base
-    tables["world"] = {"scale": scale, "tables": np.array([0.55, 0.65]) * scale, "goals": goals, "cube": cube}
-    return [
-        said,
-        f"world: scale {scale} for a reach of {reach:.2f} m, goals {goals[0]:.2f} to {goals[1]:.2f} m high",
-    ]
+    cube, deck = 0.05 * min(1.0, 2.0 * scale), np.array([0.55, 0.65]) * scale
+    tables["world"] = {"scale": scale, "tables": deck, "goals": goals, "cube": cube}
+    low, top = goals
+    return [said, f"world: scale {scale} for a reach of {reach:.2f} m, goals {low:.2f} to {top:.2f} m high"]
 
 
 def cameras(model: RobotModel) -> list[dict[str, Any]]:
@@ -81,5 +79,5 @@ def cameras(model: RobotModel) -> list[dict[str, Any]]:
     return found
 
 
-def _box(name: str, size: FloatArray | list[float], at: list[float]) -> dict[str, Any]:
+def _box(name: str, size: FloatArray | list[float], at: FloatArray | list[float]) -> dict[str, Any]:
     return {"name": name, "frame": "planar_base", "box": size, "at": at}

@@ -9,38 +9,22 @@ import numpy as np
 _WIDE = 100  # characters of a list in one line
 
 
-def toml_text(tables: Mapping[str, Any]) -> str:
+def toml_text(tables: Mapping[str, Any], path: str = "") -> str:
     """Return tables as TOML: entries first, then tables, each below its name."""
-    return "\n".join(_lines(tables, "")) + "\n"
-
-
-def _lines(table: Mapping[str, Any], path: str) -> list[str]:
-    lines = [f"{name} = {_value(value)}" for name, value in table.items() if not _tables(value)]
-    for name, value in table.items():
-        for each in _tables(value):
-            head = f"{path}{name}"
-            lines += [
-                "",
-                f"[[{head}]]" if isinstance(value, list) else f"[{head}]",
-                *_lines(each, f"{head}."),
-            ]
-    return lines
-
-
-def _tables(value: Any) -> list[Mapping[str, Any]]:
-    if isinstance(value, Mapping):
-        return [value]
-    return value if isinstance(value, list) and value and isinstance(value[0], Mapping) else []
+    inner = {name: value if isinstance(value, list) else [value] for name, value in tables.items()}
+    inner = {name: each for name, each in inner.items() if each and isinstance(each[0], dict)}
+    text = "".join(f"{name} = {_value(value)}\n" for name, value in tables.items() if name not in inner)
+    for name, several in inner.items():
+        head = f"[[{path}{name}]]" if isinstance(tables[name], list) else f"[{path}{name}]"
+        text += "".join(f"\n{head}\n{toml_text(each, f'{path}{name}.')}" for each in several)
+    return text
 
 
 def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int | float | np.floating):
-        return repr(round(float(value), 6) + 0.0)
-    parts = [_value(each) for each in value]
-    text = ", ".join(parts)
-    nested = any(isinstance(each, list | tuple) for each in value)
-    return f"[\n    {',\n    '.join(parts)},\n]" if nested and len(text) > _WIDE else f"[{text}]"
+    """Return a value as JSON, which TOML reads too: numbers rounded, a long list of lists one a line."""
+    text = json.dumps(value, default=np.ndarray.tolist)
+    plain = json.loads(text, parse_float=lambda number: round(float(number), 6) + 0.0)
+    text = json.dumps(plain, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if len(text) < _WIDE or not isinstance(plain, list) or not isinstance(plain[0], list):
+        return text
+    return f"[\n    {',\n    '.join(map(_value, plain))},\n]"

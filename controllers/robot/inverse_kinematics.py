@@ -37,7 +37,8 @@ def body_configuration(
 def hands_configuration(model: RobotModel, q: FloatArray, goals: Sequence[Pose]) -> tuple[FloatArray, float]:
     """Return the same with every hand at its own goal, by the joints that move it alone, (n,)."""
     q, description = np.array(q, dtype=np.float64), model.description
-    first = 1 + int(np.flatnonzero(np.sum(description.moves, axis=0) > 1)[-1])
+    shared = np.flatnonzero(np.sum(description.moves, axis=0) > 1)
+    first = max(len(description.base.joints), 1 + int(np.max(shared, initial=-1)))
     errors = []
     for hand, goal in zip(description.hands, goals, strict=True):
         q, error = _configuration(model.with_hand(hand.name), q, goal, 1e-4, first)

@@ -178,11 +178,11 @@ def _build(description: RobotDescription) -> pin.Model:
     return model
 
 
-def read_urdf(arm: Arm) -> pin.Model:
-    """Return all of an arm's URDF, every joint of it free."""
+def read_urdf(arm: Arm, mimic: bool = False) -> pin.Model:
+    """Return all of an arm's URDF, every joint of it free; or with joints that follow another, as it says."""
     try:
         with _without_words():
-            return pin.buildModelFromXML(urdf_text(arm))
+            return pin.buildModelFromXML(urdf_text(arm), mimic=mimic)
     except (ValueError, RuntimeError) as error:
         raise HandrailError(f"URDF {arm.urdf}: {message_of(error)}") from error
 
