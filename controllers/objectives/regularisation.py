@@ -44,8 +44,9 @@ def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> 
 
     `(q - middle) / half`, (n,). A hand that is steered straight to where it shall be may otherwise lead them
     into a corner of their limits that only going back leads out of. Nothing for an arm whose joints all turn
-    that far; nor where base or joints are steered too, or the hand's tilt is left to another objective: it
-    would pull against these.
+    that far, nor for joints that carry several hands: they would take the arms along that nobody steers. It
+    rests where base or joints are steered too, or the hand's tilt is left to another objective: it would pull
+    against these.
 
     Args:
         channels: of the robot.
@@ -53,6 +54,7 @@ def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> 
         weight: of each such joint.
     """
     narrow = limits.position_upper - limits.position_lower < np.pi
+    narrow &= np.sum([channels.moving(hand) for hand in range(len(channels.hands))], axis=0) < 2
     narrow[: len(channels.base)] = False
     if not narrow.any():
         return ()

@@ -5,10 +5,18 @@ import pytest
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.session.build import build_env, build_mode, build_modes, build_session, session_features
+from handrail.collect.session.build import (
+    build_controller,
+    build_env,
+    build_mode,
+    build_modes,
+    build_session,
+    session_features,
+)
 from handrail.collect.world.observation import from_numbers, to_numbers
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
 
 ROBOT = "tiago_pro"
 TOOLS = ("left.tool", "right.tool")
@@ -37,6 +45,22 @@ def test_either_hand_reaches(hand):
     np.testing.assert_array_equal(frame.intent.mask, channels.mask(hand))
     assert frame.action.shape == features["action"].shape == (22,)
     assert frame.state.shape == features["observation.state"].shape
+
+
+@pytest.mark.parametrize("axis", ["vz", "wy"])
+def test_an_arm_that_nobody_steers_stays_as_the_torso_moves(axis):
+    env, mode = build_env(SessionConfig(robot=ROBOT, task="reach", hand="left"), 20), MODES["ee"]
+    env.reset(seed=0)
+    channels, controller = Channels.of(env.model.description), build_controller(mode, env.model, 20)
+    controller.reset()
+    idle, before = channels.moving(1) & ~channels.moving(0), env.state().q
+    for _ in range(20):
+        intent = Intent(0.2 * channels.mask(f"left.{axis}"), channels.mask("left"), time=env.state().time)
+        command = controller.update(env.state(), intent)
+        env.step(np.append(command.velocity(env.period), [0.0, 0.0]))
+    moved = np.abs(env.state().q - before)
+    assert moved[env.model.joints.index("torso_lift_joint")] > 0.01
+    assert moved[idle].max() < 0.01
 
 
 @pytest.mark.parametrize(

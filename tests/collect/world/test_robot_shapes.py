@@ -106,14 +106,23 @@ def mesh_distance(model: RobotModel, pair: tuple[str, str], q: np.ndarray) -> fl
     """Return how far the meshes of the links that two shapes enclose are apart; −∞ for what has no mesh."""
     arm, geometry = meshes(model)
     frames = {placed.name: placed.frame for placed in model.description.collision}
-    names = [f"{frames[name]}_0" for name in pair]
-    if not all(geometry.existGeometryName(name) for name in names) or "fingers" in pair:
+    links = [own_meshes(arm, geometry, frames[name]) for name in pair]
+    if not all(links) or "fingers" in pair:
         return -np.inf
     geometry.removeAllCollisionPairs()
-    geometry.addCollisionPair(pin.CollisionPair(*(geometry.getGeometryId(name) for name in names)))
+    for each in itertools.product(*links):
+        geometry.addCollisionPair(pin.CollisionPair(*each))
     data = pin.GeometryData(geometry)
     pin.computeDistances(arm, arm.createData(), geometry, data, q[-arm.nq :])
-    return float(data.distanceResults[0].min_distance)
+    return min(found.min_distance for found in data.distanceResults)
+
+
+def own_meshes(arm: pin.Model, geometry: pin.GeometryModel, frame: str) -> list[int]:
+    """Return the mesh of a frame's link, or where it has none, those of all that its joint carries."""
+    if geometry.existGeometryName(f"{frame}_0"):
+        return [geometry.getGeometryId(f"{frame}_0")]
+    joint = arm.frames[arm.getFrameId(frame)].parentJoint if arm.existFrame(frame) else -1
+    return [index for index, each in enumerate(geometry.geometryObjects) if each.parentJoint == joint]
 
 
 @pytest.mark.parametrize("entry", ["scene", "floor"])
