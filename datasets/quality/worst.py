@@ -29,10 +29,13 @@ class Ranked:
 
 
 def ranking_metric(name: str) -> Metric:
-    """Return a metric by its name."""
-    if name not in RANKING:
+    """Return a metric by its name; of motion also one hand's alone, `left.sparc`."""
+    if name in RANKING:
+        return RANKING[name]
+    hand, _, own = name.partition(".")
+    if own not in RANKING or not RANKING[own].is_of_motion:
         raise unknown_name("metric", name, RANKING)
-    return RANKING[name]
+    return RANKING[own].of_hand(hand)
 
 
 def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]:

@@ -10,6 +10,7 @@ from handrail.datasets.quality import motion
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.scale import Scale
+from handrail.datasets.quality.worst import ranking_metric
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.naming import gripper_entries, hand_names, point_entries, quantity
 from handrail.datasets.reading.reader import DatasetInfo
@@ -83,6 +84,11 @@ def test_every_hand_has_its_values_and_one_hand_has_no_others():
     assert [metric.name for metric in measured.metrics] == list(measured.values)
     values = measured.values["right.sparc"]["two"].values
     assert values.tolist() == [motion.sparc.of_hand("right").measure(each, Scale()) for each in episodes]
+    for each in filter(lambda metric: metric.good, measured.metrics):  # `--worst` ranks by any of them
+        found = measure({"two": episodes}, np.random.default_rng(0), metrics=[ranking_metric(each.name)])
+        np.testing.assert_array_equal(
+            found.values[each.name]["two"].values, measured.values[each.name]["two"].values
+        )
     single = recorded(walk(0), [f"tool.{axis}" for axis in AXES])
     alone = measure({"one": [single]}, np.random.default_rng(0))
     assert list(alone.metrics) == list(METRICS)

@@ -63,6 +63,8 @@ def test_of_another_tool_s_dataset_lerobot_leaves_them_out(root):
     ("words", "told"),
     [
         (("--worst", "lenght"), "expected one of"),
+        (("--worst", "left.length"), "expected one of"),
+        (("--worst", "left.sparc"), "got none: no entry of action or state is called left"),
         (("--worst", "undos"), "got none: nobody held a device"),
         (("--worst", "length", "--count", "0"), "expected 1 or more"),
     ],
