@@ -32,6 +32,7 @@ _NICE = -10  # of a loop that a person steers, where the system allows that
 
 def come_first() -> None:
     """Let other programs wait for this one and its threads to come, where the system allows that."""
+    os.environ.setdefault("LP_NUM_THREADS", "0")  # without a graphics card, Mesa draws in the loop's thread
     with suppress(AttributeError, OSError):
         os.setpriority(os.PRIO_PROCESS, 0, _NICE)
 

@@ -8,7 +8,9 @@ view ─▶ operator ─ intent ─▶ loop.step ─▶ frame ─▶ observers (
 
 import gc
 import logging
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -144,7 +146,8 @@ class Session:
                 observer.begin(self.env, seed)
             loop.tally.start()
             try:
-                ended_by = self._until_over(loop)
+                with _first_in_turn() if self.realtime or self.env.real else nullcontext():
+                    ended_by = self._until_over(loop)
             finally:
                 self.env.plant.stop()
                 self._warn_if_slow(loop)
@@ -187,6 +190,21 @@ class Session:
                 "controller: %d of %d updates took longer than the period of %.0f ms, the longest %.0f ms",
                 *(len(slow), len(times), 1e3 * period, 1e3 * max(slow)),
             )
+
+
+@contextmanager
+def _first_in_turn() -> Iterator[None]:
+    """Let other programs wait for this thread, where the system allows that, and for none that it begins.
+
+    Niceness counts only among the programs of one terminal, on many a Linux.
+    """
+    with suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+    try:
+        yield
+    finally:
+        with suppress(AttributeError, OSError):
+            os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
 
 
 def _stale(intent: Intent) -> Intent:

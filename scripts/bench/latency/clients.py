@@ -55,7 +55,7 @@ class DrivingPage(Page):
 
     def __init__(self, address: str) -> None:
         super().__init__(address, "page-that-drives", self._see)
-        self.times = defaultdict[str, list[float]](list)
+        self.times, self._is_lost = defaultdict[str, list[float]](list), False
 
     def drive(self, seconds: float, rng: np.random.Generator) -> None:
         """Hold and let go for some time; where the robot has lost its input, begin anew."""
@@ -65,11 +65,14 @@ class DrivingPage(Page):
         while time.monotonic() < end:
             sign = -sign
             self.run(rng.uniform(*_RESTS))
-            pressed = self._deflect(sign)
-            came = self.until(lambda frame: _speed(frame) > _MOVES)
-            self.times["key to command"].append(self.frame["commanded"] - pressed)
-            self.times["key to page"].append(came - pressed)
+            self._is_lost, pressed = False, self._deflect(sign)
+            came = self.until(lambda frame: self._is_lost or _speed(frame) > _MOVES)
+            began = self.frame["commanded"]
             self.run(_HOLDS)
+            if self._is_lost:
+                continue
+            self.times["key to command"].append(began - pressed)
+            self.times["key to page"].append(came - pressed)
             fastest = _speed(self.frame)
             released = self._deflect(0.0)
             self.until(lambda frame, most=fastest: _speed(frame) < most - _MOVES)
@@ -88,6 +91,7 @@ class DrivingPage(Page):
         if frame["phase"] == "driving":
             self.times["round trip"].append(frame["round_trip"])
         if frame["phase"] == "lost":
+            self._is_lost = True
             self.axes = [0.0] * len(self.channels)
 
 

@@ -51,6 +51,10 @@ class LatencyConfig(ReportConfig):
     """Also measure with a busy program on every core, and pages that take what they are sent slowly."""
     browser: str = ""
     """Also measure with a browser that watches: where Chromium is, such as /usr/bin/chromium."""
+    robot: str = "ridgeback_ur10"
+    """A name, or a file, as `handrail-cockpit` takes it."""
+    cameras: str = "wrist,scene"
+    """Two of the robot's."""
     image_size: Count = 320
     """Height and width of the two cameras' pictures [pixels]; 0 for no cameras."""
     seed: Count = 0
@@ -120,10 +124,11 @@ def measure(config: LatencyConfig) -> dict[str, Any]:
 def _recording(root: Path, config: LatencyConfig, episodes: int) -> Iterator[tuple[Any, str]]:
     """Run `handrail-cockpit`; give its process and address."""
     command = [sys.executable, "-m", "handrail.scripts", "cockpit", str(root), "--task", "reach"]
+    command += ["--robot", config.robot]
     command += ["--mode", "base", "--time_limit", str(config.seconds + 600), "--cockpit.no_open"]
     command += ["--cockpit.port", "0", "--dataset.num_episodes", str(episodes), "--dataset.fps", str(FPS)]
     if config.image_size:
-        command += ["--cameras", "wrist,scene", "--image_size", str(config.image_size)]
+        command += ["--cameras", config.cameras, "--image_size", str(config.image_size)]
     with tempfile.TemporaryFile("w+") as log:
         process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=log, text=True)
         try:

@@ -1,5 +1,6 @@
 """What a person may say of an episode: done, gone wrong, throw away, begin again, wait. And being late."""
 
+import os
 import time
 from dataclasses import replace
 
@@ -195,6 +196,26 @@ def test_a_halt_is_not_caught_up_in_a_rush(now):
     lasted = np.diff(begun)
     assert np.allclose(np.delete(lasted, 7), 0.05)
     assert tally.outcome({"is_success": True, "failure_reason": ""}, None).late == 1
+
+
+@pytest.mark.parametrize("realtime", [True, False])
+def test_other_programs_wait_for_a_loop_in_real_time_until_it_ends(env, monkeypatch, realtime):
+    """However it ends; threads that it begins do not come first."""
+    said = []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *words: said.append(words[:2]))
+
+    class Failing(Rehearsal):
+        def act(self, view):
+            assert len(said) == realtime
+            raise HandrailError("it fails")
+
+    session = Session(
+        env, DirectController(env.model, env.period), Failing(env.model, MODES), realtime=realtime
+    )
+    with pytest.raises(HandrailError, match="it fails"):
+        session.run(3)
+    policies = [os.SCHED_RR, os.SCHED_OTHER] if realtime else []
+    assert said == [(0, policy | os.SCHED_RESET_ON_FORK) for policy in policies]
 
 
 def test_a_warm_up_tries_every_mode_and_leaves_no_trace(env):
