@@ -23,7 +23,7 @@ def case_figure(trace: CaseTrace, model: RobotModel, margin: float) -> Any:
         model: of the robot.
         margin: of the controller [m].
     """
-    places = np.vstack([trace.q[:, :2], trace.hand[:, :2]])
+    places = np.vstack([trace.q[:, :2], *trace.hands.swapaxes(0, 1)[..., :2]])
     length, width = np.ptp(places, axis=0) + model.description.base.size
     if length > 2.0 * width:  # paths on top of the others
         figure, layout = new_figure(11, 8.6), [["paths", "paths"], ["distances", "errors"]]
@@ -50,9 +50,18 @@ def _paths(axes: Any, trace: CaseTrace, model: RobotModel) -> None:
     for index in np.linspace(0, len(trace.q) - 1, _GHOSTS).round().astype(int):
         _robot(axes, trace.q[index], model, 0.25 + 0.5 * index / len(trace.q))
     axes.plot(*trace.q[:, :2].T, color=_BASE, lw=2.2, label="base", zorder=5)
-    axes.plot(*trace.hand[:, :2].T, color=_HAND, lw=2.2, label="hand", zorder=6)
+    for k, path in enumerate(trace.hands.swapaxes(0, 1)):
+        axes.plot(*path[:, :2].T, color=_HAND, lw=2.2, label="_hand" if k else "hand", zorder=6)
     if trace.case.held:
-        axes.plot(*trace.case.held[:2], "*", color=_HAND, ms=15, mec="white", label="held point", zorder=7)
+        axes.plot(
+            *np.array(trace.case.held)[:, :2].T,
+            "*",
+            color=_HAND,
+            ms=15,
+            mec="white",
+            label="held point",
+            zorder=7,
+        )
     axes.set(xlabel="x [m]", ylabel="y [m]", title="from above", aspect="equal")
     axes.legend(loc="upper left")
 
@@ -63,19 +72,20 @@ def _robot(axes: Any, q: FloatArray, model: RobotModel, alpha: float) -> None:
     corners = 0.5 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]]) * [length, width]
     axes.plot(*(turned(corners.T, q[2]).T + q[:2]).T, color=_BASE, lw=1.0, alpha=alpha, zorder=2)
     frames = [shape.frame for shape in model.description.collision if shape.frame != "planar_base"]
-    points = [model.pose(q, frame).position[:2] for frame in (*dict.fromkeys(frames), "tool")]
-    axes.plot(*np.array(points).T, color=GREY, lw=2.2, alpha=alpha, zorder=3, solid_capstyle="round")
+    for hand in model.description.hands:
+        arm = (*(frame for frame in dict.fromkeys(frames) if hand.name in frame), hand.named("tool"))
+        points = [model.pose(q, frame).position[:2] for frame in arm]
+        axes.plot(*np.array(points).T, color=GREY, lw=2.2, alpha=alpha, zorder=3, solid_capstyle="round")
 
 
 def _distances(axes: Any, trace: CaseTrace, margin: float) -> None:
     obstacles = {item.name for item in trace.case.scene.obstacles()}
     scene = np.array([bool({*pair} & obstacles) for pair in trace.pairs])
     floor = np.array(["floor" in pair for pair in trace.pairs])
-    own = ["–".join(pair) for pair, smaller in zip(trace.pairs, trace.own_margin, strict=True) if smaller]
     groups = (
         ("to obstacles", scene, _HAND),
         ("to itself", ~scene & ~floor & ~trace.own_margin, _BASE),
-        (f"to itself: {', '.join(own)}", trace.own_margin, _OWN),
+        ("to itself, pairs with a smaller margin", trace.own_margin, _OWN),
         ("to the floor", floor, GREY),
     )
     for label, which, colour in groups:

@@ -39,15 +39,15 @@ from handrail.scripts.bench.cases.cases import PaperCase, cases
 from handrail.scripts.bench.cases.figure import case_figure
 from handrail.scripts.bench.cases.trace import CaseTrace
 
-CASES = ("a", "b", "c")
+CASES = ("a", "b", "c", "d")
 
 
 @dataclass(frozen=True)
 class ShowcaseConfig:
-    """Run one of the paper's three cases: a: steer the hand; b: steer the base; c: circle, the hand held."""
+    """Run a case: a: steer the hand; b: steer the base; c: base on a circle, hand held; d: both held."""
 
     case: tyro.conf.Positional[str]
-    """Which: a, b or c."""
+    """Which: a, b, c or d."""
     output: str = "outputs/showcase"
     """Folder for the video, the figure and the JSON."""
     seconds: Annotated[float, Meta(ge=0, le=120)] = 0.0
@@ -85,7 +85,7 @@ def showcase(config: ShowcaseConfig) -> dict[str, Any]:
     with explained(f"--output {config.output}: cannot be made"):
         config.folder.mkdir(parents=True, exist_ok=True)
     file = config.folder / f"{case.name}.mp4"
-    mpc = build_controller(load_model())
+    mpc = build_controller(load_model(case.robot))
     trouble = graphics_trouble() if config.video else "not asked for"
     if trouble:
         trace = run_case(case, mpc)
@@ -109,15 +109,23 @@ def _words(case: PaperCase, frame: Frame) -> str:
 
 def build_controller(model: RobotModel) -> MaskedMpc:
     """Return the one controller of all cases: the masked MPC with a hold that can be switched on."""
-    hold = end_effector_hold(Channels.of(model.description), position=_HOLD)
+    channels = Channels.of(model.description)
+    holds = (end_effector_hold(channels, position=_HOLD, hand=hand) for hand in range(len(channels.hands)))
     settings = MpcSettings(posture=0.0)  # no posture to return to
-    return MaskedMpc(model, settings, objectives=(switchable(hold),), predict=Extrapolated(_WINDOW, _FADE))
+    return MaskedMpc(
+        model, settings, objectives=tuple(map(switchable, holds)), predict=Extrapolated(_WINDOW, _FADE)
+    )
 
 
 def parameters(case: PaperCase) -> Mapping[str, FloatArray]:
     """Return the parameters of the objectives in a case, by objective."""
-    point = np.array(case.held) if case.held else np.zeros(3)
-    return {"hold": switched(hold_parameters(Pose(point, np.eye(3))), bool(case.held))}
+    points = case.held or (np.zeros(3),)
+    names = ("hold",) if len(points) == 1 else ("left.hold", "right.hold")
+    poses = (Pose(np.array(point), np.eye(3)) for point in points)
+    return {
+        name: switched(hold_parameters(pose), bool(case.held))
+        for name, pose in zip(names, poses, strict=True)
+    }
 
 
 def run_case(
@@ -140,14 +148,17 @@ def run_case(
     finally:
         env.close()
     states, collision = observer.states, CollisionModel(mpc.model, case.scene.obstacles())
-    q = np.array([state.q for state in states])
+    q, tools = (
+        np.array([state.q for state in states]),
+        [hand.named("tool") for hand in mpc.model.description.hands],
+    )
     return CaseTrace(
         case=case,
         times=np.array([state.time for state in states]),
         q=q,
         asked=np.array([case.command(state.time, case.seconds) for state in states]),
         realised=np.array([_realised(case, mpc, state) for state in states]),
-        hand=np.array([mpc.model.pose(row).position for row in q]),
+        hands=np.array([[mpc.model.pose(row, tool).position for tool in tools] for row in q]),
         pairs=collision.pairs,
         own_margin=collision.largest_margin < mpc.settings.margin,
         distances=collision.values(q),
@@ -224,4 +235,4 @@ def _lines(result: dict[str, Any]) -> Iterator[str]:
     yield f"update           {solve['median']:.2f} ms median, {solve['p99']:.2f} ms p99"
     if "hold" in result:
         mean, most = (1e3 * result["hold"][name] for name in ("mean", "max"))
-        yield f"hand held        {mean:.1f} mm off in the mean, {most:.1f} mm at most"
+        yield f"hands held       {mean:.1f} mm off in the mean, {most:.1f} mm at most"

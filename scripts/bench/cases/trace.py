@@ -20,7 +20,7 @@ class CaseTrace:
     q: FloatArray  # positions, (T, n)
     asked: FloatArray  # what the operator asks for at these times on the commanded channels, (T, c)
     realised: FloatArray  # measured on these channels, (T, c)
-    hand: FloatArray  # position of the tool [m], (T, 3)
+    hands: FloatArray  # position of each tool [m], (T, H, 3)
     pairs: tuple[tuple[str, str], ...]  # names of the pairs that keep apart, (P,)
     own_margin: BoolArray  # which of them keep a smaller margin than the controller's, (P,)
     distances: FloatArray  # signed [m], (T, P)
@@ -34,8 +34,8 @@ class CaseTrace:
 
     @property
     def held_error(self) -> FloatArray:
-        """How far the hand is from the held point, (T,) [m]."""
-        return np.linalg.norm(self.hand - np.array(self.case.held), axis=1)
+        """How far the farthest hand is from its held point, (T,) [m]."""
+        return np.linalg.norm(self.hands - np.array(self.case.held), axis=2).max(axis=1)
 
     @property
     def cruise(self) -> float:
