@@ -9,6 +9,7 @@ view ─▶ operator ─ intent ─▶ loop.step ─▶ frame ─▶ observers (
 import gc
 import logging
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from copy import copy
@@ -198,12 +199,15 @@ def _first_in_turn() -> Iterator[None]:
 
     Niceness counts only among the programs of one terminal, on many a Linux.
     """
-    with suppress(AttributeError, OSError):
+    if sys.platform != "linux" or os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK != os.SCHED_OTHER:
+        yield  # it has the turn that its user gave it
+        return
+    with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
     try:
         yield
     finally:
-        with suppress(AttributeError, OSError):
+        with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
 
 
