@@ -23,20 +23,7 @@ if TYPE_CHECKING:
     from handrail.collect.session.session import Session as Session
     from handrail.collect.world.env import HandrailEnv as HandrailEnv
 
-_MODULES = {
-    "HandrailEnv": "world.env",
-    "MODES": "operators.modes",
-    "RecordConfig": "config",
-    "Session": "session.session",
-    "SessionConfig": "config",
-    "build_env": "session.build",
-    "build_session": "session.build",
-    "record": "commands.record",
-    "replay_episode": "commands.replay",
-}
-
-__all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
-__getattr__ = lazily(__name__, _MODULES)
+__all__, __getattr__ = lazily(__name__, __file__)  # pyright: ignore[reportUnsupportedDunderAll]
 
 for _spec in TASKS.built_in:
     gymnasium.register(

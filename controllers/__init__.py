@@ -28,27 +28,4 @@ if TYPE_CHECKING:
     from handrail.controllers.robot.shape import Obstacle as Obstacle
     from handrail.controllers.robot.shape import Shape as Shape
 
-
-_MODULES = {
-    "CbfFilter": "baselines.cbf_filter",
-    "Channels": "interface.channels",
-    "Command": "interface.command",
-    "Controller": "interface.controller",
-    "Diagnostics": "interface.command",
-    "DirectController": "baselines.direct",
-    "HandrailError": "errors",
-    "Intent": "interface.intent",
-    "MaskedMpc": "mpc.masked_mpc",
-    "MpcSettings": "ocp.settings",
-    "Obstacle": "robot.shape",
-    "Pose": "robot.model",
-    "RobotModel": "robot.model",
-    "Shape": "robot.shape",
-    "State": "interface.controller",
-    "Status": "interface.command",
-    "load_model": "robot.model",
-    "safety_filter": "mpc.safety_filter",
-}
-
-__all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
-__getattr__ = lazily(__name__, _MODULES)
+__all__, __getattr__ = lazily(__name__, __file__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -1,21 +1,28 @@
 """Public names of a package that are loaded when they are first used, so that importing it is quick."""
 
-from collections.abc import Callable, Mapping
+import ast
+from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 
-def lazily(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a package (PEP 562).
+def lazily(package: str, file: str) -> tuple[list[str], Callable[[str], Any]]:
+    """Return the `__all__` and the `__getattr__` (PEP 562) of a package.
+
+    Its public names are those that its `if TYPE_CHECKING:` imports: one list for type checkers and for us.
 
     Args:
         package: its name.
-        modules: of each public name, relative to the package.
+        file: its `__init__.py`.
     """
+    [block] = [each for each in ast.parse(Path(file).read_text()).body if isinstance(each, ast.If)]
+    imports = [each for each in block.body if isinstance(each, ast.ImportFrom)]
+    modules = {name.name: str(each.module) for each in imports for name in each.names}
 
     def find(name: str) -> Any:
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{modules[name]}"), name)
+        return getattr(import_module(modules[name]), name)
 
-    return find
+    return sorted(modules), find

@@ -1,7 +1,8 @@
 """LeRobot's plugins: its own commands drive the simulated robots, and people and scripts steer through them.
 
 `--robot.discover_packages_path=handrail.collect.lerobot` lets LeRobot find what is in `plugins`. The names of
-`__all__` are imported from here; LeRobot, and with it torch, is loaded when one of them is used.
+`__all__` are imported from here, and LeRobot looks for its classes here, by the names of their configs.
+LeRobot, and with it torch, is loaded when one of them is used.
 """
 
 from typing import TYPE_CHECKING
@@ -19,17 +20,4 @@ if TYPE_CHECKING:
     from handrail.collect.lerobot.scripted import HandrailScripted as HandrailScripted
     from handrail.collect.lerobot.sim import HandrailSim as HandrailSim
 
-_MODULES = {  # LeRobot looks for the classes here, by the names of their configs
-    "HandrailCockpit": "person",
-    "HandrailCockpitConfig": "configs",
-    "HandrailEnvConfig": "config_env",
-    "HandrailGamepad": "person",
-    "HandrailGamepadConfig": "configs",
-    "HandrailScripted": "scripted",
-    "HandrailScriptedConfig": "configs",
-    "HandrailSim": "sim",
-    "HandrailSimConfig": "configs",
-}
-
-__all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
-__getattr__ = lazily(__name__, _MODULES)
+__all__, __getattr__ = lazily(__name__, __file__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -51,7 +51,6 @@ def body_frame(model: pin.Model, link: str) -> pin.Frame:
 
 def hull(points: FloatArray) -> FloatArray:
     """Return the corners of the convex hull of points, (k, 3); of flat ones too."""
-    points = np.unique(points, axis=0)
     return points[ConvexHull(points, qhull_options="QJ Pp").vertices]
 
 

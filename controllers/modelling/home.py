@@ -48,13 +48,12 @@ def freedom(model: RobotModel, q: FloatArray, reach: float) -> tuple[float, floa
     slides = np.array([joint.prismatic for joint in joints_of(model)])
     enough = np.where(slides, (limits.position_upper - limits.position_lower) / 4.0, _ROOM)
     ends = np.minimum(q - limits.position_lower, limits.position_upper - q) * (_ROOM / enough)
-    free, room = [], []
+    free, room, scale = [], [], np.repeat([reach, 1.0], 3)[:, None]
     for hand in (model.with_hand(hand.name) for hand in model.description.hands):
         arm = hand.moving & (np.arange(model.size) >= base)
-        J = hand.jacobian(q)[:, arm] / np.array([*[reach] * 3, *[1.0] * 3])[:, None]
-        free.append(float(np.linalg.svd(J, compute_uv=False)[min(6, J.shape[1]) - 1]))
-        room.append(float(ends[arm].min(initial=np.inf)))
-    return min(room), min(free)
+        free.append(np.linalg.svd(hand.jacobian(q)[:, arm] / scale, compute_uv=False).min())
+        room.append(ends[arm].min(initial=np.inf))
+    return float(min(room)), float(min(free))
 
 
 def shoulder_place(model: RobotModel, hand: int, q: FloatArray) -> FloatArray:

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
 from handrail.controllers.modelling.clouds import LinkCloud
 from handrail.controllers.modelling.home import shoulder_place
 from handrail.controllers.robot.model import RobotModel
@@ -27,11 +26,10 @@ def standing(tables: dict[str, Any], model: RobotModel, clouds: list[LinkCloud],
         reach: of a hand from its shoulder [m].
     """
     base, place = tables["base"], tables["arm"][0]["translation"]
-    base_joints = len(model.description.base.joints)
-    still = [cloud.triangles.reshape(-1, 3) for cloud in clouds if cloud.joint <= base_joints]
+    fixed, joints = base["kind"] == "fixed", len(model.description.base.joints)
+    still = [cloud.triangles.reshape(-1, 3) for cloud in clouds if cloud.joint <= joints]
     points = np.vstack([*still, np.zeros((1, 3))])
     lower, size = points.min(axis=0), np.ptp(points, axis=0)
-    fixed = base["kind"] == "fixed"
     scale = round(min(reach / 1.2, 1.0), 2) if reach < _LARGE or fixed else 1.0
     second = float(shoulder_place(model, 0, model.description.home)[2])
     base |= {"mass": _HEAVY * scale**3, "height": 0.04, "size": np.maximum(size, 0.1)[:2]}
@@ -46,10 +44,9 @@ def standing(tables: dict[str, Any], model: RobotModel, clouds: list[LinkCloud],
         place[0], place[2] = _AHEAD * scale, max(_SHOULDER * scale - second, chassis[2])
         rise = max(place[2] - chassis[2] - 0.01, 0.02)
         column = [place[0], 0.0, chassis[2] + rise / 2]
-        seen = [
-            _box("chassis", chassis, chassis * [0.0, 0.0, 0.5]),
-            _box("column", [width, width, rise], column),
-        ]
+        added = {"chassis": (chassis, chassis * [0.0, 0.0, 0.5]), "column": ([width, width, rise], column)}
+        on = {"frame": "planar_base"}
+        seen = [{"name": name} | on | {"box": box, "at": at} for name, (box, at) in added.items()]
         tables["collision"] += seen
         tables["visual"] = [{"rgba": _PAINT} | shape for shape in seen]
         said = f"base: added, with chassis and column, the arm {place[2]:.2f} m above the floor"
@@ -77,7 +74,3 @@ def cameras(model: RobotModel) -> list[dict[str, Any]]:
         view = {"position": position, "looks_at": tool + scale * 0.05 * ahead, "up": above, "fovy": 85.0}
         found.append({"name": hand.named("wrist").replace(".", "_"), "frame": hand.frame} | view)
     return found
-
-
-def _box(name: str, size: FloatArray | list[float], at: FloatArray | list[float]) -> dict[str, Any]:
-    return {"name": name, "frame": "planar_base", "box": size, "at": at}
