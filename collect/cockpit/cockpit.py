@@ -199,7 +199,14 @@ class Cockpit:
             "episodes": self._episodes.described(),
             "folder": self._folder,
             "wanted": self._wanted,
-            "hands": [{"name": hand.name, "bodies": stage.hand(compiled, hand)} for hand in robot.hands],
+            "hands": [
+                {
+                    "name": hand.name,
+                    "bodies": stage.hand(compiled, hand),
+                    "joints": np.flatnonzero(channels.moving(number)).tolist(),  # that move it
+                }
+                for number, hand in enumerate(robot.hands)
+            ],
             "scale": robot.world.scale,
             "base_size": robot.base.size if len(channels.base) else (),
         }

@@ -57,6 +57,8 @@ class PageDriver(Page):
         address: of the cockpit; none where the page is open already.
     """
 
+    SCRIPT = ""  # that the page begins with
+
     def __init__(self, page, address=""):
         super().__init__(page)
         if address:

@@ -35,3 +35,8 @@ def keys(error, near=0.04, angle=0.15):
     """Return the keys of the hand to hold: for what is farther than a distance [m], or an angle [rad]."""
     far = np.abs(error) > [near] * 3 + [angle] * 3
     return {f"Key{both[int(x > 0)]}" for both, x, is_far in zip(_KEYS, error, far, strict=True) if is_far}
+
+
+def way_of(key):
+    """Return which way a key moves the hand, (6,); none for another key."""
+    return np.array([both.find(key[-1]) * 2.0 - 1.0 if key[-1] in both else 0.0 for both in _KEYS])

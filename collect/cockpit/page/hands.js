@@ -6,13 +6,14 @@ const STILL = 5; // that a pointer may move in a click [px]
 export const COLOURS = [0x00858c, 0x9333c8];
 
 // What parts of axes stand for: `ee` for what is steered, a hand or both as a pair; `one` and `two` for hands that are steered at once;
-// `lone` for the only joint that is steered beside a hand, such as a torso's.
-export function partsOf(channels, hands, active) {
-  if (hands.length < 2) return {};
+// `lone` for the only joint that is steered beside a hand, such as a torso's; `digit1` … for the joints of a group that are steered.
+export function partsOf(channels, hands, active, group) {
+  const digits = Object.fromEntries(group.map((channel, index) => [`digit${index + 1}`, channel]).filter(([, channel]) => channels.includes(channel)));
+  if (hands.length < 2) return digits;
   const owns = (part) => channels.some((name) => name.startsWith(`${part}.`)), owned = hands.filter(owns);
   const ee = owned.includes(hands[active]) ? hands[active] : owned[0] ?? (owns("pair") ? "pair" : hands[active]);
   const joints = channels.filter((name) => name.startsWith("joint.")), lone = owned.length && joints.length === 1 ? { lone: joints[0] } : {};
-  return owned.length > 1 ? { ee, one: hands[0], two: hands[1], ...lone } : { ee, ...lone };
+  return { ee, ...(owned.length > 1 ? { one: hands[0], two: hands[1] } : {}), ...lone, ...digits };
 }
 
 // The same channels by the names of axes, beside their own.

@@ -59,7 +59,7 @@ export function actionsOf({ hands }) {
   const { grip, ...others } = ACTIONS;
   const gripOf = ({ name }) => grip.says.replace("the", `the ${name}`);
   return {
-    hand: { says: "the other hand", key: "Slash", button: 0 },
+    hand: { says: "the other hand; of joints, the next that digits turn", key: "Slash", button: 0 },
     grip_left: { says: gripOf(hands[0]), key: "ShiftLeft", button: 6 },
     grip_right: { says: gripOf(hands[1]), key: "ShiftRight", button: 7 },
     ...others,
@@ -86,10 +86,20 @@ export const STICKS = {
   apart: [[3, "apart.v", -1]], // of a pair, while "turn" is held
 };
 
+// The joints' channels that digits reach at a time: those that move one hand alone, then the rest; as many as there are keys.
+export function digitGroups({ joints, base, hands }) {
+  const movedBy = (index) => hands.flatMap((hand, number) => (hand.joints.includes(index) ? [number] : []));
+  const arm = joints.flatMap((name, index) => (index < base ? [] : [{ channel: `joint.${name}`, by: movedBy(index) }]));
+  const sets = [...hands.keys(), null].map((hand) => ({ hand, own: arm.filter(({ by }) => (by.length === 1 ? by[0] : null) === hand) }));
+  return sets.flatMap(({ hand, own }) => own.flatMap((_, index) => (index % BELOW.length ? [] : [{ hand, channels: own.slice(index, index + BELOW.length).map(({ channel }) => channel) }])));
+}
+
 // The keys of the arm's joints are drawn from the robot: a digit turns one way, the key below it the other way.
+// Where there are more joints than such keys, they mean one group of them after the other.
 export function defaultKeys(stage) {
-  const arm = stage.joints.slice(stage.base, stage.base + BELOW.length);
-  const joints = arm.flatMap((name, index) => [[`Digit${index + 1}`, `joint.${name}`, 1], [BELOW[index], `joint.${name}`, -1]]);
+  const all = stage.joints.slice(stage.base).map((name) => `joint.${name}`), groups = digitGroups(stage);
+  const arm = groups.length > 1 ? BELOW.map((_, index) => `digit${index + 1}.v`) : all;
+  const joints = arm.flatMap((axis, index) => [[`Digit${index + 1}`, axis, 1], [BELOW[index], axis, -1]]);
   const first = HAND.slice(0, SECOND.length).map(([code, axis, sign]) => [code, axis.replace("ee", "one"), sign]);
   return [...HAND, ...BASE, ...joints, ...(stage.hands.length > 1 ? [...first, ...SECOND, ...APART, ...LONE] : [])];
 }

@@ -6,7 +6,7 @@ import { Help } from "./help.js";
 import { named, partsOf } from "./hands.js";
 import { Inputs } from "./inputs.js";
 import { Mapping } from "./mapping.js";
-import { BY_JOINTS, inForce, keyName } from "./keymap.js";
+import { BY_JOINTS, digitGroups, inForce, keyName } from "./keymap.js";
 import { Link } from "./link.js";
 import { Masks } from "./masks.js";
 import { Notices } from "./notices.js";
@@ -23,6 +23,7 @@ const PERIOD = 25; // between two messages [ms]
 const byId = (id) => document.getElementById(id);
 const view = new View(byId("view"), (hand) => ask("hand", hand));
 let stage = null, frame = null, told = null, drawn = null;
+let groups = [], group = 0, active = 0; // of the joints that digits mean; and the hand at that time
 
 const ask = (what, value) => { episodes.cancel(); link.ask(what, value); };
 const DO = {
@@ -41,7 +42,7 @@ const decision = new Decision(ask, way);
 const inputs = new Inputs(act);
 const gamepad = inputs.gamepad = new Gamepad(inputs, act, (words) => notices.say(words));
 const touch = new TouchSticks(byId("sticks"), inputs, act);
-const sliders = new Sliders(byId("sliders"));
+const sliders = new Sliders(byId("sliders"), (channel) => choose(groups.findIndex(({ channels }) => channels.includes(channel))));
 const link = new Link({
   connected: (isConnected) => { if (!isConnected) episodes.cancel(); panels.connected(isConnected); },
   you: (you) => { if (!you.driving) decision.close(); panels.told(you); study.told(you); },
@@ -52,6 +53,7 @@ const link = new Link({
   stage: async (said) => {
     stage = said;
     inputs.mapping = new Mapping(stage);
+    groups = digitGroups(stage);
     if (inputs.grips.length !== stage.hands.length) inputs.grips = stage.hands.map(() => false);
     for (const each of [panels, masks, sliders, episodes, study, decision, xr]) each.stage(stage);
     hint();
@@ -65,7 +67,7 @@ const masks = new Masks(link);
 const episodes = new Episodes(link);
 const help = new Help(inputs, gamepad, label);
 const study = new Study(link, (owned) => inForce(inputs.entries, owned));
-const xr = new XrHands(byId("xr"), inputs, (what, value) => link.ask(what, value), (words) => notices.say(words));
+const xr = new XrHands(byId("xr"), inputs, (what, value) => link.ask(what, value), (words) => notices.say(words), (session) => view.headset.enter(session, show, () => view.fit()));
 inputs.sources.push(gamepad, touch, sliders, xr);
 foldPanels();
 
@@ -79,8 +81,18 @@ function otherFocus() {
   return true;
 }
 
+// The other hand; where joints are steered, the next ones that digits mean.
 function otherHand() {
-  if (frame && stage?.hands.length > 1) ask("hand", stage.hands[(frame.hand + 1) % stage.hands.length].name);
+  if (!frame || !(stage?.hands.length > 1)) return;
+  const owns = (part) => [...inputs.owned].some((name) => name.startsWith(part));
+  if (owns("joint.") && !owns("ee.")) choose((group + 1) % groups.length);
+  else ask("hand", stage.hands[(frame.hand + 1) % stage.hands.length].name);
+}
+
+// Digits mean these joints now; a hand that they move is the active one.
+function choose(number) {
+  const { hand } = groups[group = number];
+  if (hand !== null && hand !== frame.hand) ask("hand", stage.hands[hand].name);
 }
 
 // The next one that there is to choose.
@@ -90,7 +102,7 @@ function next(id) {
 }
 
 function hint() {
-  notices.hint(inputs.entriesInForce(), inputs.mapping.actions, stage.grips);
+  notices.hint(inputs.entriesInForce().map(([code, axis]) => [code, inputs.channelOf(axis)]), inputs.mapping.actions, stage.grips);
 }
 
 function way() {
@@ -100,6 +112,7 @@ function way() {
 // Each button says its key, as it is now.
 function label() {
   for (const key of document.querySelectorAll("[data-key]")) key.textContent = keyName(inputs.mapping.actions[key.dataset.key] ?? "");
+  sliders.letter(inputs.entriesInForce().map(([code, axis]) => [inputs.channelOf(axis), keyName(code)]));
 }
 
 for (const name of ["start", "pause", "undo", "success", "failure", "restart", "discard", "quit", "stop"]) byId(name).addEventListener("click", () => act(name));
@@ -129,24 +142,31 @@ function owned() {
 }
 
 function own() {
-  const { ee } = inputs.parts;
-  inputs.parts = partsOf(frame.mask.map((index) => stage.channels[index]), stage.hands.map(({ name }) => name), frame.hand);
+  if (frame.hand !== active && groups[group].hand !== frame.hand) group = Math.max(0, groups.findIndex(({ hand }) => hand === frame.hand));
+  active = frame.hand;
+  const before = Object.values(inputs.parts).join();
+  inputs.parts = partsOf(frame.mask.map((index) => stage.channels[index]), stage.hands.map(({ name }) => name), active, groups[group].channels);
   const names = owned();
-  if (ee === inputs.parts.ee && [...names].join() === [...inputs.owned].join()) return;
+  if (before === Object.values(inputs.parts).join() && [...names].join() === [...inputs.owned].join()) return;
   inputs.owned = names;
   inputs.bank = 0;
   inputs.turns = false;
   view.light_up(ownedBodies());
   help.draw();
   hint();
+  label();
 }
 
-function step() {
-  requestAnimationFrame(step);
+function show() {
   if (stage && frame && frame !== drawn && view.bodies.length * 7 === frame.poses.length) {
     view.frame(frame);
     drawn = frame;
   }
+}
+
+function step() {
+  requestAnimationFrame(step);
+  show();
   view.render();
 }
 

@@ -7,8 +7,9 @@ const STEP = 0.03; // of an arrow key [rad]
 const ARROWS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 
 export class Sliders {
-  constructor(box) {
-    Object.assign(this, { box, device: "sliders", held: new Map(), targets: [], q: [], rows: [] });
+  // choose(channel): a joint's name or bar was clicked
+  constructor(box, choose) {
+    Object.assign(this, { box, choose, device: "sliders", held: new Map(), targets: [], q: [], rows: [] });
   }
 
   stage(stage) {
@@ -20,14 +21,16 @@ export class Sliders {
 
   row(name, index, stage) {
     const low = stage.lower[this.base + index] ?? -Math.PI, high = stage.upper[this.base + index] ?? Math.PI;
-    const whole = document.createElement("div"), words = document.createElement("span"), track = document.createElement("div"), knob = document.createElement("i");
+    const whole = document.createElement("div"), words = document.createElement("span"), keys = document.createElement("kbd"), track = document.createElement("div"), knob = document.createElement("i");
     whole.className = "slider";
     words.textContent = jointName(name);
     Object.assign(track, { className: "track", tabIndex: 0 });
     for (const [key, value] of Object.entries({ role: "slider", "aria-label": jointName(name), "aria-valuemin": low, "aria-valuemax": high })) track.setAttribute(key, value);
     track.append(knob);
     whole.append(words, track);
-    const row = { whole, track, knob, low, high, channel: `joint.${name}` };
+    words.prepend(keys, " ");
+    whole.addEventListener("pointerdown", () => this.choose(row.channel));
+    const row = { whole, keys, track, knob, low, high, channel: `joint.${name}` };
     this.listen(row, index);
     return row;
   }
@@ -82,6 +85,11 @@ export class Sliders {
 
   moves() {
     return [];
+  }
+
+  // Show each joint's keys, [[channel, key], …].
+  letter(entries) {
+    for (const { keys, channel } of this.rows) keys.textContent = entries.filter(([each]) => each === channel).map(([, key]) => key).join(" ");
   }
 
   // Show where the arm is; sliders are there only where the arm's joints are steered.

@@ -3,6 +3,7 @@ import { THREE } from "./three.min.js";
 import { AimMarks } from "./aim.js";
 import { Cameras } from "./cameras.js";
 import { Hands } from "./hands.js";
+import { Headset } from "./headset.js";
 import { Marks } from "./marks.js";
 import { Playback } from "./playback.js";
 import { Ground, forgetBodies, makeBodies, place } from "./scene.js";
@@ -32,6 +33,7 @@ export class View {
     this.ratio = isSoftware ? 0.75 : Math.min(devicePixelRatio, 2);
     this.scene = new THREE.Scene();
     this.cameras = new Cameras(canvas);
+    this.headset = new Headset(this.renderer, this.scene);
     this.ground = new Ground(this.scene, () => { this.stale = true; });
     this.marks = new Marks(this.scene, this.tools.label);
     this.aimMarks = new AimMarks(this.scene);
@@ -111,6 +113,7 @@ export class View {
   look(bodies, tool, tools, aim) {
     this.cameras.frame(bodies[1], tool, tools, aim);
     this.ground.follow(bodies[1].position.clone().setZ(0));
+    this.headset.follow(bodies[1].position, this.aimMarks.scale);
   }
 
   // Shows an episode that was, instead of what is; without one, what is again.
@@ -144,7 +147,7 @@ export class View {
 
   fit() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    if (!width || !height) return;
+    if (!width || !height || this.headset.isOn) return;
     this.renderer.setPixelRatio(this.ratio);
     this.renderer.setSize(width, height, false);
     this.cameras.fit(width, height, this.tools.free());
@@ -154,6 +157,7 @@ export class View {
   // Draws if anything has changed: a computer without a graphics card has better things to do.
   render() {
     this.playback.step();
+    if (this.headset.isOn) return;
     if (!this.cameras.update() && !this.stale) return;
     this.stale = false;
     const began = performance.now();

@@ -27,9 +27,9 @@ async function supported() {
 }
 
 export class XrHands {
-  // ask(what, value): of the robot; say(words): to the person
-  constructor(button, inputs, ask, say) {
-    Object.assign(this, { button, inputs, ask, say, device: "xr", session: null, leads: new Map(), names: [], hands: [] });
+  // ask(what, value): of the robot; say(words): to the person; draw(session): the scene into it
+  constructor(button, inputs, ask, say, draw) {
+    Object.assign(this, { button, inputs, ask, say, draw, device: "xr", session: null, leads: new Map(), names: [], hands: [] });
     supported().then((mode) => {
       this.mode = mode;
       button.hidden = !mode;
@@ -46,14 +46,19 @@ export class XrHands {
       session.addEventListener(`${kind}end`, ({ inputSource }) => { if (kind === this.clutch(inputSource)) this.drop(inputSource); });
     }
     session.addEventListener("visibilitychange", () => { if (session.visibilityState !== "visible") this.letGo(); });
-    const context = document.createElement("canvas").getContext("webgl", { xrCompatible: true });
-    await session.updateRenderState({ baseLayer: new XRWebGLLayer(session, context) });
+    await (session.domOverlayState ? this.overlay(session) : this.draw(session));
     this.space = await session.requestReferenceSpace("local");
     this.session = session;
     this.button.setAttribute("aria-pressed", "true");
     this.ask("frame", "world"); // the pose is meant in the scene
     session.requestAnimationFrame((_, frame) => this.step(frame));
     return undefined;
+  }
+
+  // A phone shows the page itself over what its camera sees.
+  async overlay(session) {
+    const context = document.createElement("canvas").getContext("webgl", { xrCompatible: true });
+    await session.updateRenderState({ baseLayer: new XRWebGLLayer(session, context) });
   }
 
   ended() {

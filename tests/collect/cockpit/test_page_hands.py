@@ -20,10 +20,38 @@ class Session extends EventTarget {
   visibilityState = "visible";
   updateRenderState() {}
   async requestReferenceSpace() { return {}; }
-  requestAnimationFrame(step) { setTimeout(() => step(0, {getPose: (space) => window.poses[space]}), 20); }
+  steps = [];
+  requestAnimationFrame(step) {
+    if (this.steps.push(step) > 1) return;
+    setTimeout(() => {
+      for (const each of this.steps.splice(0)) each(0, window.seen);
+      if (window.turned) window.layer?.count();
+    }, 20);
+  }
+  cancelAnimationFrame() { this.steps = []; }
   async end() { this.dispatchEvent(new Event("end")); }
 }
-window.XRWebGLLayer = class {};
+window.seen = {
+  getPose: (space) => window.poses[space],
+  getViewerPose: () => window.turned ? {views: ["left", "right"].map((eye) => ({
+    eye, transform: {matrix: window.turned},
+    projectionMatrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, -1, 0, 0, -0.1, 0],
+  }))} : null,
+};
+delete window.XRWebGLBinding;
+WebGL2RenderingContext.prototype.makeXRCompatible = async () => {};
+window.XRWebGLLayer = class {
+  framebuffer = null; framebufferWidth = 200; framebufferHeight = 100; // the canvas
+  constructor(session, gl) { window.layer = Object.assign(this, {gl}); }
+  getViewport({eye}) { return {x: eye === "left" ? 0 : 100, y: 0, width: 100, height: 100}; }
+  count() { // the colours that each eye sees
+    window.colours = [0, 100].map((x) => {
+      const seen = new Uint8Array(40000);
+      this.gl.readPixels(x, 0, 100, 100, this.gl.RGBA, this.gl.UNSIGNED_BYTE, seen);
+      return new Set(new Uint32Array(seen.buffer)).size;
+    });
+  }
+};
 const controller = (handedness) => ({handedness, targetRayMode: "tracked-pointer", gripSpace: handedness});
 window.controllers = {left: controller("left"), right: controller("right")};
 window.press = (kind, side) => session.dispatchEvent(
@@ -162,9 +190,7 @@ def test_each_gripper_has_its_key_and_both_hands_have_theirs(two):
     made.holds("Q", "left.wz")
     made.driver.press("Slash")
     made.holds("Q", "right.wz")  # turns are the active hand's
-    made.holds(
-        "",
-    )
+    made.moves(made.rest)
     made.driver.press("KeyH")
     expect(made.driver.at("help-table")).to_contain_text("right hand up")
     expect(made.driver.at("help-actions")).to_contain_text("open or close the right gripper")
@@ -175,7 +201,7 @@ def test_a_pair_is_steered_as_one_hand_and_parted(two):
     apart = made.names.index("apart.v")
     assert not made.holds("W", "pair.vx").mask[apart]  # the robot keeps it
     assert made.holds("0", "apart.v").values[apart] > 0.0
-    made.rest()
+    made.moves(made.rest)
     assert made.holds("9", "apart.v").values[apart] < 0.0
 
 
@@ -242,3 +268,33 @@ def test_a_grip_takes_its_hand_where_one_is_steered(two):
     made.expect_active("right")
     made.page.evaluate("poses.right = at(-0.05)")
     made.moves(lambda: None, "right.vx")
+
+
+def test_a_headset_shows_the_robot_ahead_and_not_behind_and_then_the_page_is_back(two):
+    made = two("both", TwoControllers, XR)
+    made.page.evaluate("window.turned = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]")  # by columns
+    made.enter()
+    sees = "(ahead) => window.colours?.every((count) => (count > 130) === ahead)"
+    made.page.wait_for_function(sees, arg=True)
+    made.page.evaluate("turned[0] = turned[10] = -1")  # about the vertical
+    made.page.wait_for_function(sees, arg=False)
+    made.page.evaluate("session.end()")
+    made.page.wait_for_function("() => document.getElementById('view').width > 200")
+
+
+def test_digits_turn_every_joint_one_group_after_the_other(two):
+    """The arms' joints and then the rest, in turn or by a click on a bar; each bar says its keys."""
+    made = two("joints")
+    bars, rest = made.page.locator("#sliders .slider"), ["torso_lift", "head_1", "head_2"]
+    groups = [*([f"arm_{side}_{n}" for n in range(1, 8)] for side in SIDES), rest]
+    assert {f"joint.{each}_joint" for group in groups for each in group} == {*made.names[-17:]}
+    for active, group in zip((*SIDES, "right"), groups, strict=True):
+        made.expect_active(active)
+        expect(bars.filter(has=made.page.locator("kbd:not(:empty)"))).to_have_count(len(group))
+        for digit, joint in enumerate(group, 1):
+            made.holds(str(digit), f"joint.{joint}_joint")
+        made.moves(made.rest)
+        made.driver.press("Slash")
+    bars.filter(has_text="head 2").locator("span").click()
+    made.holds("C", "joint.head_2_joint")
+    shoot(made.page, "digits")

@@ -17,7 +17,9 @@ class Session extends EventTarget {
   visibilityState = "visible";
   updateRenderState() {}
   async requestReferenceSpace() { return {}; }
+  cancelAnimationFrame() {}
   requestAnimationFrame(step) { setTimeout(() => step(0, {getViewerPose: () => window.pose}), 20); }
+  domOverlayState = {type: "screen"};
   async end() { this.dispatchEvent(new Event("end")); }
 }
 window.XRWebGLLayer = class {};
@@ -131,7 +133,7 @@ def test_any_mask_is_chosen_and_a_mode_goes_back(on_bench):
     page.get_by_role("button", name="you own the base").click()
     both = made.wait(lambda intent: intent.mask.sum() == before.sum() + 3)
     assert both.mode.startswith("mask:")
-    page.get_by_text("More").click()
+    page.get_by_text("More", exact=True).click()
     page.get_by_text("Single channels").click()
     page.get_by_role("button", name="hand down, hand up").click()
     made.wait(lambda intent: intent.mask.sum() == both.mask.sum() - 1)

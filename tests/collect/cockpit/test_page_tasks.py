@@ -3,6 +3,7 @@
 The dataset that comes of it is a LeRobot dataset like any other.
 """
 
+import os
 import subprocess
 import sys
 
@@ -13,19 +14,22 @@ from command_helpers import command
 from page_driver import PageDriver
 from page_learner import Learner
 from page_levers import Keys, Pad
+from page_pair import PairDriver, PairKeys, PairLearner, PairPad, carry_box
 from page_recording import recording, saved
+from places import TIAGO
 
 pytestmark = pytest.mark.slow
 PATIENT = ("--time_limit", "180")  # who tries what each key does takes longer, on a busy computer above all
 
 
-def drive(new_page, folder, task, device, episodes, mode):
-    """Do a task some times, as somebody who sees the page for the first time."""
-    flags = ("--task", task, "--mode", mode, "--dataset.num_episodes", episodes, *PATIENT)
+def drive(new_page, folder, does, device, episodes, mode, person=(PageDriver, Learner), *more):
+    """Do a task some times, as somebody who sees the page for the first time, or knows it."""
+    flags = ("--task", does.__name__, "--mode", mode, "--dataset.num_episodes", episodes, *PATIENT, *more)
     with recording(folder, *flags) as (process, address):
-        driver = PageDriver(new_page(device.SCRIPT), address)
+        sees, learns = person
+        driver = sees(new_page(sees.SCRIPT + device.SCRIPT), address)
         driver.begin()
-        learner = Learner(driver, device(driver), mode.startswith("direct"))
+        learner = learns(driver, device(driver), mode.startswith("direct"))
         driver.set_speed(1.0)
         learner.learn()
         driver.press("ArrowLeft")  # that was to learn; now again, and it counts
@@ -33,7 +37,7 @@ def drive(new_page, folder, task, device, episodes, mode):
             driver.begin()
             learner.begin()
             driver.set_speed(1.0)
-            getattr(page_tasks, task)(learner)
+            does(learner)
             assert driver.wait(lambda: page_tasks.over(driver), 100.0), driver.text("numbers")
         assert process.wait(60) == 0
 
@@ -72,9 +76,9 @@ def test_reach_by_keys(new_page, reached):
 @pytest.mark.parametrize(
     ("task", "levers", "device", "mode", "episodes", "fewest"),
     [
-        ("pick_place", Keys, "keyboard", "ee", 5, 4),
-        ("pick_place", Pad, "gamepad", "ee", 3, 3),
-        ("reach", Keys, "keyboard", "direct", 1, 1),
+        (page_tasks.pick_place, Keys, "keyboard", "ee", 5, 4),
+        (page_tasks.pick_place, Pad, "gamepad", "ee", 3, 3),
+        (page_tasks.reach, Keys, "keyboard", "direct", 1, 1),
     ],
 )
 def test_who_tries_what_each_lever_does_does_the_task(
@@ -83,6 +87,14 @@ def test_who_tries_what_each_lever_does_does_the_task(
     """Nobody is told what a joint's key does to the hand; they find out, within a longer time."""
     drive(new_page, tmp_path / "d", task, levers, episodes, mode)
     check(tmp_path / "d", episodes, device, mode, fewest)
+
+
+@pytest.mark.parametrize(("levers", "device"), [(PairKeys, "keyboard"), (PairPad, "gamepad")])
+def test_who_knows_where_the_box_is_carries_it_with_both_hands(new_page, tmp_path, levers, device):
+    """`HANDRAIL_CARRIED=5` for five times; how many of them went well is printed."""
+    episodes, person = int(os.environ.get("HANDRAIL_CARRIED", "1")), (PairDriver, PairLearner)
+    drive(new_page, tmp_path / "d", carry_box, levers, episodes, "pair", person, "--robot", TIAGO)
+    check(tmp_path / "d", episodes, device, "pair", max(1, episodes * 3 // 5))
 
 
 def test_what_was_driven_is_a_dataset_like_any_other(reached, tmp_path):
