@@ -40,7 +40,7 @@ def test_a_case_is_tracked_and_safe(name):
     assert (result["contacts"], result["brakes"]) == (0, 0)
     assert result["tracking"]["share"] < 0.01
     assert result["smallest_distance_at_full_margin"]["value"] >= 0.09
-    assert result["smallest_distance"]["value"] >= (0.01 if name == "d" else 0.09)  # forearm and palm
+    assert result["smallest_distance"]["value"] >= (0.01 if name == "d" else 0.09)  # torso and head
     assert np.all(np.abs(trace.q[:, :2]) < load_model(trace.case.robot).description.limits.position_upper[:2])
 
 
