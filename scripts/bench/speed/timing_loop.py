@@ -197,10 +197,10 @@ def _without(description: RobotDescription, words: tuple[str, ...]) -> RobotDesc
 
     joints = np.array([stays(name) for name in description.joints])
     pairs = np.array([all(map(stays, pair)) for pair in description.self_pairs])
-    limits, hands = description.limits, tuple(hand for hand in description.hands if stays(hand.frame))
+    limits, hands = description.limits, [hand for hand in description.hands if stays(hand.frame)]
     return replace(
         description,
-        hands=hands if len(hands) > 1 else (replace(hands[0], name=""),),
+        hands=tuple(hands) if len(hands) > 1 else (replace(hands[0], name=""),),
         cameras=(),
         arms=tuple(replace(arm, joints=tuple(filter(stays, arm.joints))) for arm in description.arms),
         home=description.home[joints],
