@@ -3,6 +3,7 @@
 import gymnasium
 import numpy as np
 import pytest
+from places import TIAGO
 
 from handrail.collect.lerobot import (
     HandrailEnvConfig,
@@ -18,7 +19,7 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.description import load_description
 
-ROBOT = "tiago_pro"
+ROBOT = TIAGO
 CHANNELS = Channels.of(load_description(ROBOT))
 GRIPPERS = ("left.gripper.pos", "right.gripper.pos")
 

@@ -14,6 +14,7 @@ from lerobot.robots.openarm_follower import openarm_follower
 from lerobot.robots.openarm_follower.config_openarm_follower import OpenArmFollowerConfigBase
 from lerobot.robots.reachy2 import Reachy2RobotConfig, robot_reachy2
 from lerobot.robots.so_follower import SOFollowerConfig
+from places import TIAGO
 from processor_helpers import PERIOD, Drive
 
 from handrail.collect.processor.units import robot_units
@@ -21,7 +22,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import load_description
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
-TIAGO, HANDS = "tiago_pro", ("left", "right")
+HANDS = ("left", "right")
 PANDA = EXAMPLES.parents[1] / "controllers" / "robot" / "robots" / "ridgeback_panda.toml"
 AXES = ("vx", "vy", "vz", "wx", "wy", "wz")
 

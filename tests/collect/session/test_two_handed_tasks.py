@@ -3,6 +3,7 @@
 import gymnasium
 import numpy as np
 import pytest
+from places import TIAGO
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -11,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 
-ROBOT = "tiago_pro"
+ROBOT = TIAGO
 
 
 SPEED = 0.08  # of the base [m/s]

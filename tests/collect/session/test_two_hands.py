@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from places import TIAGO
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -18,7 +19,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 
-ROBOT = "tiago_pro"
+ROBOT = TIAGO
 TOOLS = ("left.tool", "right.tool")
 
 

@@ -1,6 +1,7 @@
 """Policies of robots with two hands: each hand sees for itself, and what they write is each hand's own."""
 
 import numpy as np
+import places
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -14,7 +15,7 @@ from handrail.policies.imitation.interface.checkpoint import MIXED, PolicyMeta, 
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import CompletedRobot, Completion
 
-TIAGO = load_description("tiago_pro")
+TIAGO = load_description(places.TIAGO)
 CHANNELS, JOINTS, N = Channels.of(TIAGO), TIAGO.joints, len(TIAGO.joints)
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 HANDS = ("left", "right")
