@@ -32,7 +32,6 @@ def _piece(name: str) -> Callable[..., str]:
 page = _piece("page")  # (title, *parts, what=""): a whole page that needs nothing else
 section = _piece("section")  # (title, *parts): with a heading if it has a title
 table = _piece("table")  # (Table): its title above and its caption below
-film = _piece("film")  # (address of a video)
 items = _piece("items")  # (pairs of a class of the style and a text): a list
 paragraph = _piece("paragraph")  # (text, look="")
 panels = _piece("panels")  # (title, note, address of each figure, look=""): `small`, `wide`, or half a page

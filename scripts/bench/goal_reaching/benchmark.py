@@ -1,4 +1,4 @@
-"""The goal-reaching benchmark from settings to report."""
+"""The goal-reaching benchmark from settings to page."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -6,47 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.world.gl import graphics_trouble
-from handrail.datasets.presentation.drawing import address, png, svg
+from handrail.datasets.presentation.drawing import png
 from handrail.datasets.presentation.markdown import write_part
-from handrail.datasets.presentation.markup import film, folded, page, panels, paragraph, section
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.storage.atomic import explained, write_whole
+from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.strict_json import write_json
 from handrail.scripts.bench.goal_reaching.config import BASELINES, Baseline, BenchmarkConfig
-from handrail.scripts.bench.goal_reaching.figures import CAPTIONS, Example, figures
+from handrail.scripts.bench.goal_reaching.figures import example_strip, figures
 from handrail.scripts.bench.goal_reaching.metrics import measures_by_goal, summarise
 from handrail.scripts.bench.goal_reaching.run import available, goals, run, trace_of
 from handrail.scripts.bench.goal_reaching.tables import benchmark_tables
 from handrail.scripts.bench.report import command_line, report
-
-_CONDITIONS = (
-    *("titles", "config", "mpc_settings", "mpc_paper_settings"),
-    *("physics", "machine", "versions", "skipped"),
-)
-
-
-def write_report(
-    results: Mapping[str, Any], drawn: Mapping[str, Any], video: Path | None, path: Path
-) -> None:
-    """Write the report.
-
-    Args:
-        results: as summarised.
-        drawn: figures by name.
-        video: a file to embed.
-        path: of the HTML file.
-    """
-    shown = [(CAPTIONS[name], "", svg(each)) for name, each in drawn.items()]
-    parts = [section("Tables", *benchmark_tables(results)), section("Figures", panels(shown, "wide"))]
-    if video is not None:
-        parts.append(section("Example", film(address(video.read_bytes(), "video/mp4"))))
-    listed = {
-        group: ", ".join(f"{name} {value}" for name, value in results[group].items()) for group in _CONDITIONS
-    }
-    settings = (folded(group, paragraph(text)) for group, text in listed.items() if text)
-    parts.append(section("Conditions", *settings))
-    what = f"{results['config']['goals']} goals, the same for every controller"
-    write_whole(path, page("Goal reaching", *parts, what=what).encode())
 
 
 def write_page(
@@ -66,7 +36,7 @@ def write_page(
     for name, data in pictures.items():
         write_whole(path.parent / f"{stem}_{name}.png", data)
     write_json(path.parent / f"{stem}.json", {**results, "episodes": measures_by_goal(results)}, indent=None)
-    command = command_line("goal_reaching", replace(config, json="", report="", page=""))
+    command = command_line("goal_reaching", replace(config, json="", page=""))
     parts = [
         f"`{command}`; [every number]({stem}.json).",
         *(f"![{name}]({stem}_{name}.png)" for name in pictures),
@@ -86,32 +56,18 @@ def benchmark(
         console: to show how far it is, and what was left out.
     """
     config.check()
-    folder = Path(config.report).expanduser()
-    if config.report:
-        with explained(f"--report {config.report}: cannot be made"):
-            folder.mkdir(parents=True, exist_ok=True)
     present, skipped = available(baselines, config)
     for name, reason in skipped.items():
         console.print(f"without {name}: {reason}")
     episodes = run(config, present, console)
     results = summarise([episode.row for episode in episodes], config, present, skipped)
-    if not (config.report or config.page):
-        return results
-    drawn, example = figures(results, episodes, goals(config)), None
-    if trouble := graphics_trouble() if config.video else "not asked for":
-        console.print(f"without an example to look at: {trouble}")
-    else:  # the first two controllers on the first goal
-        runs = [(who, *trace_of(config, who, 0)) for who in present[:2]]
-        example = Example(runs[0][1], [(who.help, trace) for who, _, trace in runs])
-    if config.report:
-        write_json(folder / "benchmark.json", results)
-        video = folder / "benchmark.mp4" if example else None
-        if example and video:
-            example.film(video)
-        write_report(results, drawn, video, folder / "benchmark.html")
     if config.page:
-        pictures = {name: png(figure) for name, figure in drawn.items()}
-        pictures |= {"example": example.strip()} if example else {}
+        pictures = {name: png(each) for name, each in figures(results, episodes, goals(config)).items()}
+        if trouble := graphics_trouble() if config.video else "not asked for":
+            console.print(f"without an example to look at: {trouble}")
+        else:  # the first two controllers on the first goal
+            runs = [(who, *trace_of(config, who, 0)) for who in present[:2]]
+            pictures["example"] = example_strip(runs[0][1], [(who.help, trace) for who, _, trace in runs])
         write_page(results, pictures, Path(config.page).expanduser(), config)
     return results
 
@@ -121,7 +77,6 @@ def main(config: BenchmarkConfig) -> int:
     console = Terminal()
     results = benchmark(config, {name: BASELINES.find(name) for name in config.controller_names}, console)
     report("goal_reaching", replace(config, page=""), benchmark_tables(results), results)
-    for written in (config.report and f"{config.report}/benchmark.html", config.page):
-        if written:
-            console.print(f"Written: {written}")
+    if config.page:
+        console.print(f"Written: {config.page}")
     return 0

@@ -2,12 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Annotated, Any
 
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_names, names, one_of
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import Registry, resolved
 from handrail.controllers.typed import AtLeastOne, Count
 from handrail.datasets.lists import Names
@@ -95,10 +93,8 @@ class BenchmarkConfig(ReportConfig, ExecutionConfig):
     """The planner sees the hand and corrects its errors, instead of running open loop."""
     workers: int = field(default=1, kw_only=True)
     """Processes that share the work; 0 for as many as there are cores, which makes all times longer."""
-    report: str = ""
-    """Write an HTML report with figures and a video to this folder."""
     video: bool = True
-    """Whether the report has an example video, the page a strip of pictures (needs OpenGL)."""
+    """Whether the page has an example, a strip of pictures (needs OpenGL)."""
 
     @property
     def controller_names(self) -> tuple[str, ...]:
@@ -125,5 +121,3 @@ class BenchmarkConfig(ReportConfig, ExecutionConfig):
         check_names("controller", "--controllers", self.controller_names, BASELINES)
         check_names("profile", "--profile", self.profile_names, PROFILES)
         self.check_execution()
-        if self.report and Path(self.report).expanduser().is_file():
-            raise HandrailError(f"--report {self.report}: expected a folder, found a file")

@@ -1,17 +1,14 @@
 """The benchmark's figures, and an example of it to look at: controllers on the same goal, in step."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from fractions import Fraction
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from handrail.collect.session.film import VideoFile, captioned, contact_sheet
+from handrail.collect.session.film import captioned, contact_sheet
 from handrail.collect.world.rendering import Painter
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.simulation import Simulation
@@ -24,13 +21,6 @@ from handrail.scripts.bench.goal_reaching.metrics import SHOWN, Trace, column, r
 from handrail.scripts.bench.goal_reaching.run import BenchEpisode
 from handrail.scripts.bench.goal_reaching.tables import PUBLISHED
 
-CAPTIONS = {
-    "distributions": "Every episode's measures; dashed: means published, grey RL, orange proposed.",
-    "paths": "Base (blue) and hand (orange) from above [m]; failed episodes dotted, goals as stars.",
-    "profiles": "Success with its 95 % interval, and jerkiness, by profile.",
-    "paired": "The first controller minus the others on the same goals, with 95 % bootstrap intervals;"
-    " blue below zero, orange above, grey where zero is inside.",
-}
 _BASE, _HAND = COLOURS[:2]
 _WIDTH = 11.0  # [inch]
 _DRAWN = (
@@ -166,56 +156,34 @@ def _logarithmic(axes: Any) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-_SIZE = (360, 480)  # of one picture of the video [px]
-_SMALL = (252, 336)  # of one in a strip [px]
-_MOMENTS = 5  # of a strip
-_COLOURS = 256  # of a strip
+_SIZE = (252, 336)  # of a picture of the example [px]
+_MOMENTS = 5  # of the example
+_TINTS = 256  # of the example
 _BAR = 44  # height of the caption [px]
-EVERY = 3  # steps between pictures
-_REST = 10  # pictures after the end
 
 
-@dataclass(frozen=True)
-class Example:
-    """Some runs under the same conditions."""
+def example_strip(given: Conditions, runs: Sequence[tuple[str, Trace]]) -> bytes:
+    """Return runs under the same conditions as one PNG: a row each, from left to right in step.
 
-    conditions: Conditions  # goal and obstacles
-    runs: Sequence[tuple[str, Trace]]  # who, and what happened
+    The robot is among the obstacles, and the goal is marked.
 
-    def film(self, path: Path) -> None:
-        """Write them as a video, side by side."""
-        size = (_SIZE[0] + _BAR, _SIZE[1] * len(self.runs))
-        rate = 1 / (EVERY * Fraction(STEP).limit_denominator(1000))
-        steps = range(0, self._longest + _REST * EVERY, EVERY)
-        with VideoFile(path, size, rate) as video:
-            for pictures in self._pictures(steps, _SIZE):
-                video.add(np.hstack(pictures))
-
-    def strip(self) -> bytes:
-        """Return them as one PNG: a row each, from left to right in step."""
-        steps = np.linspace(0, self._longest - 1, _MOMENTS).round().astype(int).tolist()
-        rows = zip(*self._pictures(steps, _SMALL), strict=True)
-        sheet = Image.fromarray(contact_sheet([each for row in rows for each in row], columns=_MOMENTS))
-        buffer = BytesIO()
-        sheet.quantize(_COLOURS).save(buffer, "png", optimize=True)
-        return buffer.getvalue()
-
-    @property
-    def _longest(self) -> int:
-        return max(len(trace.q) for _, trace in self.runs)
-
-    def _pictures(self, steps: Sequence[int], size: tuple[int, int]) -> Iterator[list[NDArray[np.uint8]]]:
-        """Yield the pictures of all runs, step by step: the robot among the obstacles, the goal marked."""
-        model, given = load_model(), self.conditions
-        marker = goal_marker(Pose(given.goal.position, given.goal.rotation))
-        scene = Scene((*given.scene.objects, marker), given.scene.view)
-        simulation = Simulation(model, scene, model.description.home, STEP, meshes=True)
-        painter = Painter(size, pretty=True)
-        try:
-            for step in steps:
-                yield [_panel(simulation, painter, who, trace, step) for who, trace in self.runs]
-        finally:
-            painter.close()
+    Args:
+        given: goal and obstacles.
+        runs: who, and what happened.
+    """
+    steps = np.linspace(0, max(len(trace.q) for _, trace in runs) - 1, _MOMENTS).round().astype(int)
+    model, marker = load_model(), goal_marker(given.goal)
+    scene = Scene((*given.scene.objects, marker), given.scene.view)
+    simulation = Simulation(model, scene, model.description.home, STEP, meshes=True)
+    painter = Painter(_SIZE, pretty=True)
+    try:
+        pictures = [_panel(simulation, painter, *each, step) for each in runs for step in steps.tolist()]
+    finally:
+        painter.close()
+    buffer = BytesIO()
+    sheet = Image.fromarray(contact_sheet(pictures, columns=_MOMENTS))
+    sheet.quantize(_TINTS).save(buffer, "png", optimize=True)
+    return buffer.getvalue()
 
 
 def _panel(simulation: Simulation, painter: Painter, who: str, trace: Trace, step: int) -> NDArray[np.uint8]:

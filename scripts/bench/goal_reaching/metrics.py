@@ -115,7 +115,7 @@ def jerkiness(velocities: FloatArray) -> float:
 Row = Mapping[str, Any]
 _COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
 KEPT = (*(name for name in METRICS if name != "wall_time_s"), *SAFETY, *SETTLED)
-_PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
+_PLACES = ("json", "page")  # settings that say where results are written on a machine
 
 
 def summarise(
