@@ -35,7 +35,6 @@ class ReactiveController:
         model: of the robot.
         ask: the velocity wanted.
         period: time in which a velocity is reached, one control period [s].
-        intent_timeout: age from which an intent is stale [s].
         understood: channels that may be commanded, (m,); all of them when None.
         margins: that `ask` keeps: between shapes, and between tool shapes and work surfaces [m].
 
@@ -51,7 +50,6 @@ class ReactiveController:
         model: RobotModel,
         ask: Ask,
         period: float = 0.05,
-        intent_timeout: float = DEAD_MAN_TIME,
         understood: BoolArray | None = None,
         margins: tuple[float, float] = (0.0, 0.0),
     ) -> None:
@@ -59,7 +57,7 @@ class ReactiveController:
         self._model = model
         self._ask = ask
         self._limiter = Limiter(model.description)
-        self._validator = InputValidator(self.channels, intent_timeout)
+        self._validator = InputValidator(self.channels, DEAD_MAN_TIME)
         self._period = period
         self._foreign = np.zeros(self.channels.size, dtype=bool) if understood is None else ~understood
         self._margins = margins

@@ -8,7 +8,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.reactive import ReactiveController
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
+from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import Pose, RobotModel
 
@@ -68,10 +68,8 @@ def blended(operator: Completion, autonomy: Completion, share: float = 0.5) -> C
     return blend
 
 
-def twist_controller(
-    model: RobotModel, complete: Completion, period: float = 0.05, intent_timeout: float = DEAD_MAN_TIME
-) -> ReactiveController:
-    """Return the controller that completes the tool's twist by a rule; other channels make it brake.
+class TwistController(ReactiveController):
+    """Completes the tool's twist by a rule; other channels make it brake; a controller.
 
     Axes of the tool that nobody commands are kept still; with none commanded the robot rests.
 
@@ -79,20 +77,21 @@ def twist_controller(
         model: of the robot.
         complete: the rule.
         period: of the control loop [s].
-        intent_timeout: age from which an intent is stale [s].
     """
-    channels = Channels.of(model.description)
 
-    def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
+    def __init__(self, model: RobotModel, complete: Completion, period: float = 0.05) -> None:
+        self._complete = complete
+        understood = Channels.of(model.description).mask(model.hand.name or "ee")
+        super().__init__(model, self._completed, period, understood)
+
+    def _completed(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         if not intent.mask.any():
-            return np.zeros(model.size)
-        twist = tool_twist(intent, channels, model.pose(state.q), model.number)
-        return complete(state.q, previous, twist, period)
-
-    return ReactiveController(model, ask, period, intent_timeout, channels.mask(model.hand.name or "ee"))
+            return np.zeros(self._model.size)
+        twist = tool_twist(intent, self.channels, self._model.pose(state.q), self._model.number)
+        return self._complete(state.q, previous, twist, self._period)
 
 
-def least_squares_controller(model: RobotModel, period: float = 0.05) -> ReactiveController:
+def least_squares_controller(model: RobotModel, period: float = 0.05) -> TwistController:
     """Return the controller of the hand alone: `WholeBodyCompletion`, clipped as `DirectController` clips.
 
     It looks neither ahead nor at obstacles.
@@ -101,7 +100,7 @@ def least_squares_controller(model: RobotModel, period: float = 0.05) -> Reactiv
         model: of the robot.
         period: of the control loop [s].
     """
-    return twist_controller(model, WholeBodyCompletion(model), period)
+    return TwistController(model, WholeBodyCompletion(model), period)
 
 
 def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArray:

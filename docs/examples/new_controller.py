@@ -12,7 +12,7 @@ from handrail.collect import MODES, Session, SessionConfig
 from handrail.collect.session.build import build_operator
 from handrail.controllers import RobotModel
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.baselines.twist_completion import twist_controller
+from handrail.controllers.baselines.twist_completion import TwistController
 
 
 class TransposedJacobian:
@@ -36,7 +36,7 @@ class TransposedJacobian:
 def main() -> None:
     """Let the scripted operator steer through it; input checks, limits and brakes come with the shell."""
     env = gymnasium.make("handrail/Reach-v0").unwrapped
-    controller = twist_controller(env.model, TransposedJacobian(env.model), period=1.0 / env.fps)
+    controller = TwistController(env.model, TransposedJacobian(env.model), period=1.0 / env.fps)
     operator = build_operator(SessionConfig(task="reach"), MODES["ee"], env.model)
     session = Session(env, controller, operator)
     for seed in range(3):

@@ -6,11 +6,7 @@ import pinocchio as pin
 from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_twist
-from handrail.controllers.baselines.twist_completion import twist_controller
-from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.command import Command
-from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.baselines.twist_completion import TwistController
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.policies.rl.observation import (
@@ -26,7 +22,7 @@ from handrail.policies.rl.policy import Actor
 _AHEAD = 5.0  # without a goal, where the present twist leads in this time is the goal [s]
 
 
-class RlController:
+class RlController(TwistController):
     """The reinforcement-learning baseline; a controller for twists of the tool, at about 33 Hz.
 
     Clipped to the robot's limits; brakes when an input is invalid or stale and when other channels are
@@ -41,14 +37,8 @@ class RlController:
 
     def __init__(self, model: RobotModel, period: float = STEP, actor: Actor | None = None) -> None:
         check_robot(model)
-        self._model, self._arm, self._actor = model, ArmCompletion(model), actor or Actor.load()
-        self._inner = twist_controller(model, self._velocity, period)
-        self.reset()
-
-    @property
-    def channels(self) -> Channels:
-        """The robot's command channels."""
-        return self._inner.channels
+        self._arm, self._actor = ArmCompletion(model), actor or Actor.load()
+        super().__init__(model, self._velocity, period)
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the episode, its goal too; take the obstacles whose distance is reported."""
@@ -56,19 +46,11 @@ class RlController:
         self._desired: RigidPose | None = None
         self._goal: RigidPose | None = None
         self._action = np.zeros(ACTION_SIZE)
-        self._inner.reset(obstacles)
-
-    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now, and what the hand holds."""
-        self._inner.update_scene(obstacles)
+        super().reset(obstacles)
 
     def aim(self, goal: Pose) -> None:
         """Say where the twists of this episode lead; without it, the present twist is followed onward."""
         self._goal = (goal.position, goal.rotation)
-
-    def update(self, state: State, intent: Intent) -> Command:
-        """Return the command from now on."""
-        return self._inner.update(state, intent)
 
     def _velocity(
         self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float

@@ -7,7 +7,7 @@ import pytest
 
 from handrail.controllers import MaskedMpc
 from handrail.controllers.baselines.catalogue import CONTROLLERS
-from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
+from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
@@ -55,7 +55,7 @@ BUILT = {
     "mpc": lambda: MaskedMpc(MODEL),
     "filter": lambda: resolved(CONTROLLERS["filter"].build)(MODEL, 0.05),
     "cbf": lambda: resolved(CONTROLLERS["cbf"].build)(MODEL, 0.05),
-    "dls": lambda: twist_controller(MODEL, WholeBodyCompletion(MODEL), 0.05),
+    "dls": lambda: TwistController(MODEL, WholeBodyCompletion(MODEL), 0.05),
 }
 
 

@@ -13,7 +13,7 @@ from handrail.collect.world.scene import Scene
 from handrail.collect.world.task import Start, Task, Verdict
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.catalogue import ControllerSpec
-from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
+from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
 from handrail.controllers.robot.catalogue import ROBOTS, RobotSpec
 from handrail.controllers.robot.model import Pose
 
@@ -54,7 +54,7 @@ class PressScript:
 
 
 def dls(model, period):
-    return twist_controller(model, WholeBodyCompletion(model), period)
+    return TwistController(model, WholeBodyCompletion(model), period)
 
 
 def robot_like(model, mode, task, human):

@@ -9,7 +9,7 @@ from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.base_following import BaseFollowingCompletion
-from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
+from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
 from handrail.controllers.baselines.twist_completion import blended as blend
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller, State
@@ -140,22 +140,17 @@ def mpc_paper(model: RobotModel, period: float) -> Controller:
     return MaskedMpc(model, paper_settings())
 
 
-def whole_body(model: RobotModel, period: float) -> Controller:
-    """Return damped least squares on all joints."""
-    return twist_controller(model, WholeBodyCompletion(model), period)
-
-
 def nominal_base(model: RobotModel, period: float) -> Controller:
     """Return damped least squares on the arm, and a nominal base."""
-    return twist_controller(model, WeldedBaseCompletion(model), period)
+    return TwistController(model, WeldedBaseCompletion(model), period)
 
 
 def base_following(model: RobotModel, period: float) -> Controller:
     """Return base and arm that share nothing but the robot."""
-    return twist_controller(model, BaseFollowingCompletion(model), period)
+    return TwistController(model, BaseFollowingCompletion(model), period)
 
 
 def blended(model: RobotModel, period: float) -> Controller:
     """Return the average of two completions."""
     both = blend(WholeBodyCompletion(model), WeldedBaseCompletion(model))
-    return twist_controller(model, both, period)
+    return TwistController(model, both, period)
