@@ -88,10 +88,11 @@ class HandrailScriptedConfig(TeleoperatorConfig):
     reset_time_s: float = 1.0
     """The same as `--dataset.reset_time_s`; the scene changes then."""
 
-    def check(self) -> None:
-        """Check the settings."""
+    def checked(self) -> "HandrailScriptedConfig":
+        """Return these settings, checked."""
         check(self.episode_time_s, NonNegative, "--teleop.episode_time_s")
         check(self.reset_time_s, Annotated[float, Meta(ge=0.5, le=1e12)], "--teleop.reset_time_s")
+        return self
 
 
 @TeleoperatorConfig.register_subclass("handrail_cockpit")
@@ -110,8 +111,8 @@ class HandrailCockpitConfig(TeleoperatorConfig):
     certificate: str = ""
     """Folder of a certificate of your own, cert.pem and key.pem."""
 
-    def cockpit(self) -> CockpitConfig:
-        """Return where the cockpit listens."""
+    def checked(self) -> CockpitConfig:
+        """Return where the cockpit listens, checked."""
         config = CockpitConfig(self.host, self.token, self.port, self.open, self.certificate)
         config.check()
         return config
@@ -129,8 +130,8 @@ class HandrailGamepadConfig(TeleoperatorConfig):
     exponent: float = TeleopConfig.exponent
     """Curve of a stick, 1 (straight) to 3 (fine near the middle)."""
 
-    def teleop(self) -> TeleopConfig:
-        """Return the settings of the device."""
+    def checked(self) -> TeleopConfig:
+        """Return the settings of the device, checked."""
         config = TeleopConfig(map=self.map, dead_zone=self.dead_zone, exponent=self.exponent)
         config.check("gamepad")
         return config

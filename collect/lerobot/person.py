@@ -9,31 +9,24 @@ from dataclasses import fields, replace
 from functools import partial
 from typing import Any
 
-from handrail.collect.cockpit.cockpit import Cockpit, check_installed
+from handrail.collect.cockpit.cockpit import NEEDED, Cockpit
 from handrail.collect.cockpit.process import open_server
 from handrail.collect.config import RecordConfig, SessionConfig
 from handrail.collect.devices.open_devices import open_device
 from handrail.collect.lerobot.configs import HandrailCockpitConfig, HandrailGamepadConfig
 from handrail.collect.lerobot.sim import HandrailSim
 from handrail.collect.lerobot.teleoperator import SimTeleoperator
+from handrail.controllers.errors import check_installed
 from handrail.datasets.presentation.terminal import Terminal
 
 _REFUSED = ("mode", "mask", "hand", "lock", "practice", "undo", "quit")  # LeRobot's loop has none of them
 
 
 class HandrailCockpit(SimTeleoperator):
-    """A person at a browser steers `handrail_sim`.
-
-    Args:
-        config: its settings.
-    """
+    """A person at a browser steers `handrail_sim`."""
 
     config_class = HandrailCockpitConfig
     name = "handrail_cockpit"
-
-    def __init__(self, config: HandrailCockpitConfig) -> None:
-        self._settings = config.cockpit()
-        super().__init__(config)
 
     @property
     def address(self) -> str:
@@ -41,7 +34,7 @@ class HandrailCockpit(SimTeleoperator):
         return self._server.address
 
     def _made(self, robot: HandrailSim) -> Cockpit:
-        check_installed()
+        check_installed(*NEEDED)
         robot.env.render_mode = "rgb_array"  # from the next episode on the robot looks as it does
         say = Terminal().print
         self._server = open_server(self._settings, say)
@@ -50,18 +43,10 @@ class HandrailCockpit(SimTeleoperator):
 
 
 class HandrailGamepad(SimTeleoperator):
-    """A person with a gamepad steers `handrail_sim`.
-
-    Args:
-        config: its settings.
-    """
+    """A person with a gamepad steers `handrail_sim`."""
 
     config_class = HandrailGamepadConfig
     name = "handrail_gamepad"
-
-    def __init__(self, config: HandrailGamepadConfig) -> None:
-        self._settings = config.teleop()
-        super().__init__(config)
 
     def _made(self, robot: HandrailSim) -> Any:
         robot.env.render_mode = "rgb_array"

@@ -60,23 +60,14 @@ class EpisodeClock:
 
 
 class HandrailScripted(SimTeleoperator):
-    """A script with a human-like hand steers `handrail_sim`; the same scene, the same motion.
-
-    Args:
-        config: its settings.
-    """
+    """A script with a human-like hand steers `handrail_sim`; the same scene, the same motion."""
 
     config_class = HandrailScriptedConfig
     name = "handrail_scripted"
     is_person = False
 
-    def __init__(self, config: HandrailScriptedConfig) -> None:
-        config.check()
-        super().__init__(config)
-        self._config = config
-
     def _made(self, robot: HandrailSim) -> Operator:
-        config = self._config
+        config = self._settings
         person = replace(robot.session, noise=config.noise, person=config.person)
         person.check()
         margin = _MARGIN * robot.env.period

@@ -20,11 +20,19 @@ _BUTTONS = {
 
 
 class SimTeleoperator(Uncalibrated, Teleoperator):
-    """A teleoperator of `handrail_sim`; another kind makes its operator."""
+    """A teleoperator of `handrail_sim`; another kind makes its operator.
+
+    Args:
+        config: its settings; `checked()` returns what they say, checked.
+    """
 
     is_person = True
     """Whether the operator is somebody who is shown what happens, and whose device is given back."""
     _operator: Any = None
+
+    def __init__(self, config: Any) -> None:
+        self._settings = config.checked()
+        super().__init__(config)
 
     @property
     def robot(self) -> HandrailSim:
