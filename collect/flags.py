@@ -54,20 +54,3 @@ def check_file(flag: str, file: str, ending: str = "") -> None:
     if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
         kind = f"{ending} file" if ending else "file"
         raise HandrailError(f"{flag} {file}: expected a {kind} in an existing folder")
-
-
-def check_page(page: str) -> None:
-    """Check that a Markdown page can be written, if one is asked for."""
-    check_file("--page", page, ".md")
-
-
-def check_json(path: str) -> None:
-    """Check that a file of JSON can be written, if one is asked for."""
-    check_file("--json", path)
-
-
-def check_whole(config: Any, **least: int) -> None:
-    """Check that settings are no smaller than they may be, by their names."""
-    for name, smallest in least.items():
-        if getattr(config, name) < smallest:
-            raise HandrailError(f"--{name} {getattr(config, name)}: expected a whole number >= {smallest}")

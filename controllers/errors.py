@@ -1,6 +1,8 @@
 """The one error root."""
 
-from collections.abc import Iterable
+import importlib.util
+from collections.abc import Collection, Iterable
+from typing import Any
 
 FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 """Exit codes of commands: work that failed, input that is refused, Ctrl-C or SIGTERM."""
@@ -36,6 +38,21 @@ def not_installed(wanted_by: str, module: str, extra: str = "") -> HandrailError
         f"{wanted_by}: expected {module}, found none; in the clone of Handrail: "
         f"pip install -c constraints.txt {what}"
     )
+
+
+def imported(name: str, wanted_by: str, module: str, extra: str = "") -> Any:
+    """Return a module by its name, such as `mink` of the package mink; arguments as of `not_installed`."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise not_installed(wanted_by, module, extra) from error
+
+
+def check_installed(wanted_by: str, modules: Collection[str], extra: str) -> None:
+    """Check that modules can be imported, without that; arguments as of `not_installed`."""
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            raise not_installed(wanted_by, module, extra)
 
 
 def shown(value: object) -> str:

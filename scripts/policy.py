@@ -1,14 +1,14 @@
 """Commands that train policies and let them drive; PyTorch is loaded only where it is installed."""
 
-from handrail.controllers.errors import FAILED
-from handrail.policies.imitation.config import TrainConfig, check_installed
+from handrail.controllers.errors import FAILED, check_installed
+from handrail.policies.imitation.config import TrainConfig, check_trainable
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 
 
 def train(config: TrainConfig) -> int:
     """Train a policy; return the exit code."""
-    check_installed("handrail-train", ("torch", "accelerate"), config.policy)
+    check_trainable("handrail-train", config.policy)
     from handrail.datasets.presentation.terminal import Terminal
     from handrail.policies.imitation.training import training
 
@@ -18,7 +18,7 @@ def train(config: TrainConfig) -> int:
 
 def train_encoder(config: EncoderConfig) -> None:
     """Train an encoder."""
-    check_installed("handrail-encoder", ("torch",))
+    check_installed("handrail-encoder", ("torch",), "train")
     from handrail.policies.imitation.encoder import training
 
     training.train(config)
@@ -26,7 +26,7 @@ def train_encoder(config: EncoderConfig) -> None:
 
 def evaluate(config: EvaluateConfig) -> int:
     """Run trained policies on declared seeds; return the exit code."""
-    check_installed("handrail-evaluate", ("torch",))
+    check_installed("handrail-evaluate", ("torch",), "train")
     from handrail.datasets.presentation.terminal import Terminal
     from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
     from handrail.policies.imitation.evaluation.file import evaluation_table

@@ -9,7 +9,6 @@ import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +31,12 @@ from handrail.collect.operators.person.person import Person
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
-from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.errors import HandrailError, check_installed
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.recording.frames import Frame
 
-_NEEDED = ("uvicorn", "starlette", "websockets", "cryptography")  # of the extra 'cockpit'
+NEEDED = "the cockpit", ("uvicorn", "starlette", "websockets", "cryptography"), "cockpit"
 _JPEG_QUALITY = 70
 _PICTURE_SIDE = 320  # of a live picture at most; the recorded one is as large as it is [px]
 
@@ -215,7 +214,7 @@ class Cockpit:
 
 def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], None]) -> Cockpit:
     """Return the cockpit of a recording, and say where it is."""
-    check_installed()
+    check_installed(*NEEDED)
     modes = build_modes(config, env)
     server = open_server(config.cockpit, say)
     folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
@@ -228,13 +227,6 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     return Cockpit(
         env.model, modes, config.mode_name, server, folder=folder, wanted=wanted, next=then, say=say
     )
-
-
-def check_installed() -> None:
-    """Check that what the page's server needs is there."""
-    for module in _NEEDED:
-        if find_spec(module) is None:
-            raise not_installed("the cockpit", module, "cockpit")
 
 
 def _known(limit: float) -> float | None:

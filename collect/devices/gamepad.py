@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.devices.device import DeviceInput, StickShape
-from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.errors import HandrailError, imported
 
 AXES = ("left_x", "left_y", "right_x", "right_y", "left_trigger", "right_trigger")  # in SDL's order
 BUTTONS = (
@@ -77,14 +77,10 @@ def _sdl() -> tuple[Any, Any]:
     """Return pygame and its gamepads, without a window."""
     for name, value in _HEADLESS.items():
         os.environ.setdefault(name, value)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # pygame's own use of setuptools
-            import pygame
-            from pygame._sdl2 import controller
-    except ImportError as error:
-        raise not_installed("--operator gamepad", "pygame", "devices") from error
-    return pygame, controller
+    wanted = "--operator gamepad", "pygame", "devices"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # pygame's own use of setuptools
+        return imported("pygame", *wanted), imported("pygame._sdl2.controller", *wanted)
 
 
 def _why_none(others: int) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from handrail.collect.devices.device import DeviceInput, StickShape
-from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.errors import HandrailError, imported
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 _OWN = (*AXES, *(f"button_{number}" for number in range(1, 33)))
@@ -140,10 +140,7 @@ class SpaceMice:
 
 def _plugged() -> tuple[Any, list[bytes]]:
     """Return hidapi, and the addresses of those that are plugged in."""
-    try:
-        import hid
-    except ImportError as error:
-        raise not_installed("--operator spacemouse", "hidapi", "devices") from error
+    hid = imported("hid", "--operator spacemouse", "hidapi", "devices")
     return hid, sorted({each["path"] for each in hid.enumerate() if _is_one(each)})
 
 

@@ -3,10 +3,9 @@
 import os
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 
-from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.errors import HandrailError, check_installed
 from handrail.datasets.advanced import Advanced
 
 MOST_WORKERS = 256
@@ -42,8 +41,8 @@ class ExecutionConfig:
             )
         if self.ray and self.workers != type(self).workers:
             raise HandrailError(f"{ray} and {workers}: expected one of them, got both")
-        if self.ray and find_spec("ray") is None:
-            raise not_installed(ray, "ray", "cluster")
+        if self.ray:
+            check_installed(ray, ("ray",), "cluster")
 
 
 def cores(cgroup: Path = _CGROUP) -> int:

@@ -8,7 +8,7 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
@@ -16,7 +16,7 @@ from handrail.collect.lekiwi.host_loop import LeKiwiLoop
 from handrail.collect.processor.units import robot_units
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, message_of, not_installed
+from handrail.controllers.errors import HandrailError, imported, message_of
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.storage.strict_json import write_json
@@ -33,7 +33,7 @@ class HostSockets:
     """
 
     def __init__(self, config: HostConfig) -> None:
-        zmq = import_zmq("handrail-lekiwi host")
+        zmq = imported("zmq", "handrail-lekiwi host", "pyzmq", "lekiwi")
         self._again, self._nowait = zmq.Again, zmq.NOBLOCK
         self._context = zmq.Context()
         self._commands = self._context.socket(zmq.PULL)
@@ -98,12 +98,3 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> NoReturn:
         if config.json:
             write_json(Path(config.json).expanduser(), summary)
         say(json.dumps({name: value for name, value in summary.items() if name != "episodes"}))
-
-
-def import_zmq(wanted_by: str) -> Any:
-    """Return pyzmq."""
-    try:
-        import zmq
-    except ImportError as error:
-        raise not_installed(wanted_by, "pyzmq", "lekiwi") from error
-    return zmq

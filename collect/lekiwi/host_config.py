@@ -6,7 +6,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from handrail.collect.client_config import Port
-from handrail.collect.flags import check_json, names, one_of
+from handrail.collect.flags import check_file, names, one_of
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
@@ -58,4 +58,4 @@ class HostConfig:
         check_settings(self, "--")
         if self.port_zmq_cmd == self.port_zmq_observations:
             raise HandrailError("--port_zmq_cmd and --port_zmq_observations: expected two ports, got one")
-        check_json(self.json)
+        check_file("--json", self.json)

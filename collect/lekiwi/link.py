@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.client_config import CLIENTS, ClientConfig
 from handrail.collect.flags import check_names
-from handrail.collect.lekiwi.host import import_zmq
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, imported, message_of
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel
 
@@ -193,7 +192,7 @@ def connect(
         model: of the robot.
         fps: commands a second.
     """
-    import_zmq(f"--robot_client {robot}")
+    imported("zmq", f"--robot_client {robot}", "pyzmq", "lekiwi")
     from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
     from lerobot.robots.lekiwi.config_lekiwi import lekiwi_cameras_config
 

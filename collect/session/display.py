@@ -10,7 +10,7 @@ import numpy as np
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.viewer import Viewer
 from handrail.collect.world.env import HandrailEnv
-from handrail.controllers.errors import HandrailError, message_of, not_installed
+from handrail.controllers.errors import HandrailError, imported, message_of
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
@@ -125,10 +125,7 @@ class Display:
     def __init__(
         self, spawn: bool = False, web: bool = False, save: str = "", say: Callable[[str], None] = print
     ) -> None:
-        try:
-            import rerun as rr
-        except ImportError as error:
-            raise not_installed("--display_data, _web, _save", "rerun", "display") from error
+        rr = imported("rerun", "--display_data, _web, _save", "rerun", "display")
         self._rr, self._save, self._say = rr, save, say
         self._viewer: Viewer | None = None
         self._stream: Any = None

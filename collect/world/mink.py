@@ -6,24 +6,20 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.baselines.twist_completion import twist_controller
+from handrail.controllers.baselines.twist_completion import TwistController
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.errors import not_installed
-from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.command import Command
-from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.errors import imported
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
-ACTIVATION_DISTANCE = 0.15  # beyond the margin, at which a pair enters the problem [m]
+_ACTIVATION_DISTANCE = 0.15  # beyond the margin, at which a pair enters the problem [m]
 _BASE_COST, _ARM_COST = 0.0055, 0.01  # of velocities: the masked MPC's, square-rooted, relative to the tool's
 _MARGIN = 0.10  # signed distance kept between shapes [m]
 _APPROACH = 2.0  # how fast a distance may shrink, relative to what is left above the margin [1/s]
 _SOLVERS = ("daqp", "proxqp", "quadprog")  # the fastest first; PIQP is slower than these and prints
 
 
-class MinkController:
+class MinkController(TwistController):
     """One step of mink an update: the tool's twist, damped, inside limits, pairs kept apart; a controller.
 
     `min ‖J Δq − twist Δt‖² + ‖C Δq‖²` subject to velocity and position limits and, for every pair of shapes,
@@ -33,27 +29,13 @@ class MinkController:
     Args:
         model: of the robot.
         period: of the control loop [s].
-        activation_distance: beyond the margin, at which a pair enters the problem [m].
     """
 
-    def __init__(
-        self, model: RobotModel, period: float = 0.05, activation_distance: float = ACTIVATION_DISTANCE
-    ) -> None:
-        try:
-            import mink
-            import qpsolvers
-        except ImportError as error:
-            raise not_installed("differential IK", "mink", "profile") from error
-        self._mink: Any = mink
+    def __init__(self, model: RobotModel, period: float = 0.05) -> None:
+        wanted = "differential IK", "mink", "profile"
+        self._mink, qpsolvers = (imported(name, *wanted) for name in ("mink", "qpsolvers"))
         self._solver = next(name for name in _SOLVERS if name in qpsolvers.available_solvers)
-        self._model, self._period, self._activation_distance = model, period, activation_distance
-        self._reactive = twist_controller(model, self._velocity, period)
-        self.reset()
-
-    @property
-    def channels(self) -> Channels:
-        """The robot's command channels."""
-        return self._reactive.channels
+        super().__init__(model, self._velocity, period)
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the last command; build mink's tasks and limits for the scene of a new episode."""
@@ -68,18 +50,14 @@ class MinkController:
         speeds = dict(zip(model.joints, model.description.limits.velocity.tolist(), strict=True))
         limits = [mink.ConfigurationLimit(self._shapes), mink.VelocityLimit(self._shapes, speeds)]
         self._limits = [*limits, *self._avoidance(around)]
-        self._reactive.reset(obstacles)
+        super().reset(obstacles)
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now; mink does not avoid what the hand holds."""
-        self._reactive.update_scene(obstacles)
+        super().update_scene(obstacles)
         for obstacle in obstacles:
             if not obstacle.held:
                 self._shapes.geom(obstacle.name).pos[:] = obstacle.position
-
-    def update(self, state: State, intent: Intent) -> Command:
-        """Return the command from now on."""
-        return self._reactive.update(state, intent)
 
     def _avoidance(self, obstacles: tuple[Obstacle, ...]) -> list[Any]:
         """Return a limit for every margin that pairs keep: a few of the robot's own keep less.
@@ -99,7 +77,7 @@ class MinkController:
                 [([a], [b]) for (a, b), kept in zip(collision.pairs, margins, strict=True) if kept == margin],
                 gain=min(_APPROACH * self._period, 1.0),
                 minimum_distance_from_collisions=margin,
-                collision_detection_distance=margin + self._activation_distance,
+                collision_detection_distance=margin + _ACTIVATION_DISTANCE,
             )
             for margin in np.unique(margins).tolist()
         ]

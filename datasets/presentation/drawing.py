@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from handrail.controllers.errors import not_installed
 from handrail.datasets.printable import printable
 
 COLOURS = (
@@ -42,10 +41,8 @@ def short(label: str, most: int) -> str:
 
 def new_figure(width: float, height: float) -> Any:
     """Return an empty figure [inch]."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise not_installed("the report", "matplotlib") from error
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -1,14 +1,13 @@
 """Settings of imitation training; light to import."""
 
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
 from handrail.collect.config import StoredConfig
-from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.errors import HandrailError, check_installed
 from handrail.controllers.typed import AtLeastOne, Count, NonNegative, check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Words
@@ -111,15 +110,6 @@ class TrainConfig:
         return {key.strip(): value.strip() for key, _, value in pairs}
 
 
-def check_installed(command: str, modules: tuple[str, ...], policy: str = "", extra: str = "train") -> None:
-    """Check that modules can be imported, and those of a policy.
-
-    Args:
-        command: that needs them.
-        modules: that every policy needs.
-        policy: its name in LeRobot.
-        extra: of Handrail that brings them.
-    """
-    for module in (*modules, *_OF_POLICY.get(policy, ())):
-        if find_spec(module) is None:
-            raise not_installed(command, module, extra)
+def check_trainable(command: str, policy: str) -> None:
+    """Check that a command has what trains a policy, by its name in LeRobot."""
+    check_installed(command, ("torch", "accelerate", *_OF_POLICY.get(policy, ())), "train")

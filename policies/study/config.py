@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.flags import check_page
+from handrail.collect.flags import check_file
 from handrail.controllers.errors import HandrailError
 
 
@@ -38,4 +38,4 @@ class StudyConfig(ExecutionConfig):
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
         if self.report_only and not any((self.folder / name).is_dir() for name in ("begun", "done")):
             raise HandrailError(f"--report_only: expected a study in --output {self.output}, found none")
-        check_page(self.page)
+        check_file("--page", self.page, ".md")

@@ -10,7 +10,7 @@ from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
-from handrail.policies.imitation.config import TrainConfig, check_installed
+from handrail.policies.imitation.config import TrainConfig, check_trainable
 from handrail.policies.imitation.training.presets import policy_config
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import StudyDesign, check_known
@@ -46,7 +46,7 @@ def run_study(config: StudyConfig, work: Work = do, isolated: bool = True) -> in
     console.print(told)
     if config.plan:
         return 0
-    check_installed("handrail-study", ("torch", "accelerate"), design.policy)
+    check_trainable("handrail-study", design.policy)
     if config.page:
         with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
     with explained(f"--output {config.output}: expected a folder that can be written"):

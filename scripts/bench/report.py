@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from msgspec import to_builtins
 
-from handrail.collect.flags import check_json, check_page
+from handrail.collect.flags import check_file
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import check, check_settings
 from handrail.controllers.versions import versions
@@ -36,8 +36,8 @@ class ReportConfig:
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""
         check_settings(self, "--")
-        check_json(self.json)
-        check_page(self.page)
+        check_file("--json", self.json)
+        check_file("--page", self.page, ".md")
 
 
 def command_line(name: str, config: Any) -> str:

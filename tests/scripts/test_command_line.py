@@ -19,10 +19,9 @@ from pages import COMMAND_CONFIGS, CONFIGS
 from places import FLOORS, sources
 from rich.console import Console
 
-from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.errors import HandrailError, check_installed, not_installed
 from handrail.datasets.lists import Names, Numbers, Words, split_list
 from handrail.datasets.presentation.table import Table
-from handrail.policies.imitation.config import check_installed
 from handrail.scripts import cli
 
 STORED = ("inspect", "edit repair", "replay", "train", "record")
@@ -151,7 +150,7 @@ def test_install_hints_come_from_one_place_and_lead_to_the_clone():
         message = str(not_installed("--flag", "module", extra))
         assert message.endswith(f"in the clone of Handrail: pip install -c constraints.txt {what}")
     with pytest.raises(HandrailError, match=r"^handrail-x: expected nowhere, found none; .*'\.\[rl\]'$"):
-        check_installed("handrail-x", ("nowhere",), extra="rl")
+        check_installed("handrail-x", ("nowhere",), "rl")
 
 
 def shown(table: Table) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 import psutil
 from msgspec import Meta
 
-from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.errors import HandrailError, imported
 from handrail.controllers.typed import Count
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.reading.reader import read_episodes, read_frames
@@ -194,11 +194,7 @@ def _browser(program: str, address: str) -> Iterator[None]:
     if not program:
         yield
         return
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError as error:
-        raise not_installed("--browser", "playwright", "dev") from error
-    with sync_playwright() as play:
+    with imported("playwright.sync_api", "--browser", "playwright", "dev").sync_playwright() as play:
         flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
         browser = play.chromium.launch(executable_path=program, args=flags)
         page = browser.new_page(viewport={"width": 1280, "height": 720})

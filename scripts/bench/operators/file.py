@@ -6,7 +6,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.flags import check_names, check_page, names
+from handrail.collect.flags import check_file, check_names, names
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
@@ -63,7 +63,7 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
         check_names("mode", "--modes", self.mode_names, MODES)
         if not self.json.endswith(".json"):
             raise HandrailError(f"--json {self.json}: expected a file that ends in .json")
-        check_page(self.page)
+        check_file("--page", self.page, ".md")
         self.check_execution()
 
 

@@ -6,10 +6,9 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, check_installed
 from handrail.controllers.typed import AtLeastOne, Count, Fraction, NonNegative, check_settings
 from handrail.datasets.lists import Numbers
-from handrail.policies.imitation.config import check_installed
 
 _FREE_ON_RESUME = ("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average", "resume")
 _Share = Annotated[float, Meta(gt=0, le=1)]
@@ -70,7 +69,7 @@ class TrainRlConfig:
 
     def check(self) -> None:
         """Check the settings."""
-        check_installed("bench rl", ("stable_baselines3", "tensorboard"), extra="rl")
+        check_installed("bench rl", ("stable_baselines3", "tensorboard"), "rl")
         check_settings(self, "--")
         if not self.layers or min(self.layers) < 1:
             raise HandrailError(f"--layers {self.layers}: expected sizes of 1 or more")

@@ -14,7 +14,7 @@ from typing import Annotated
 import tyro
 from msgspec import Meta
 
-from handrail.collect.flags import check_page
+from handrail.collect.flags import check_file
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import Count, check_settings
 from handrail.datasets.presentation.terminal import Terminal
@@ -53,7 +53,7 @@ class SoakConfig:
     def check(self) -> None:
         """Check the settings."""
         check_settings(self, "--")
-        check_page(self.page)
+        check_file("--page", self.page, ".md")
         if self.folder.is_file():
             raise HandrailError(f"OUTPUT {self.output}: expected a folder, found a file")
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from importlib import import_module
 from time import monotonic
 from typing import Any
 
@@ -13,7 +12,7 @@ from scipy import sparse
 from handrail.collect.world.mink import MinkController
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.core.library import Memory, functions
-from handrail.controllers.errors import not_installed
+from handrail.controllers.errors import imported
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.solvers.converged import ConvergedSolver
@@ -102,10 +101,7 @@ def _mink(loop: TimingLoop) -> Take:
 
 def _pink(loop: TimingLoop) -> Take:
     """Return one step of pink for the hand: same shapes and limits; its barrier keeps 2 cm of the nearest."""
-    try:
-        pink, barriers = import_module("pink"), import_module("pink.barriers")
-    except ImportError as error:
-        raise not_installed("pink", "pin-pink") from error
+    pink, barriers = (imported(name, "pink", "pin-pink") for name in ("pink", "pink.barriers"))
     model, limits = loop.model.pinocchio.copy(), loop.model.description.limits
     model.lowerPositionLimit, model.upperPositionLimit = limits.position_lower, limits.position_upper
     model.velocityLimit = limits.velocity
@@ -213,10 +209,7 @@ def _daqp(loop: TimingLoop) -> Take:
 
 def _piqp(loop: TimingLoop) -> Take:
     """Return PIQP, a proximal interior-point method, on sparse matrices; it cannot begin with a guess."""
-    try:
-        piqp: Any = import_module("piqp")
-    except ImportError as error:
-        raise not_installed("PIQP", "piqp", "profile") from error
+    piqp = imported("piqp", "PIQP", "piqp", "profile")
     program = _programs(loop)
 
     def take(update: Update) -> Solve:
