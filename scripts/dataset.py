@@ -74,10 +74,10 @@ def push(config: PushConfig) -> None:
     dataset, say = config.dataset, Terminal().print
 
     def preview(root: Path) -> bytes:
-        from handrail.collect.commands import preview
+        from handrail.collect.commands import render
 
         try:
-            return preview.preview(root)
+            return render.preview(root)
         except HandrailError as error:
             say(f"The card gets no picture: {error}")
             return b""

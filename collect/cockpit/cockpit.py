@@ -17,8 +17,7 @@ import numpy as np
 from PIL import Image
 
 from handrail.collect.cockpit import stage
-from handrail.collect.cockpit.disk import DiskRoom
-from handrail.collect.cockpit.episodes import EpisodeList, EpisodePoses
+from handrail.collect.cockpit.episodes import DiskRoom, EpisodeList, EpisodePoses
 from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess, open_server
 from handrail.collect.cockpit.snapshot import Snapshots

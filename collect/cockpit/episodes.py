@@ -1,4 +1,4 @@
-"""The episodes of this run: how they went, and the poses of the newest ones, for pages to play them again.
+"""The episodes of this run: how they went, the poses of the newest for pages to play again, room for more.
 
 A file of poses is `n` (uint32) and `n` bytes of JSON, filled up with blanks to whole words, then float32
 numbers: in every row the time [s] and where each body is, position [m] and quaternion (wxyz).
@@ -6,7 +6,10 @@ numbers: in every row the time [s] and where each body is, position [m] and quat
 
 import hashlib
 import json
+import shutil
 import struct
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,3 +84,24 @@ class EpisodeList:
             del self._sizes[oldest]
             self._server.drop(oldest)
         return name
+
+
+class DiskRoom:
+    """Measures the room that is left for episodes, in a folder that need not exist yet; when no loop waits.
+
+    Attributes:
+        left: free [bytes], and about how many episodes that is; -1 where it is unknown.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._before, self.left = folder, -1, (-1, -1)
+        self.measure(0)
+
+    def measure(self, saved: int) -> None:
+        """Look how much is left after so many episodes were saved since this began."""
+        with suppress(OSError):  # a file was gone between two looks
+            place = next(each for each in (self._folder, *self._folder.parents) if each.is_dir())
+            used = sum(file.stat().st_size for file in self._folder.rglob("*") if file.is_file())
+            self._before = used if self._before < 0 else self._before
+            free, grown = shutil.disk_usage(place).free, used - self._before
+            self.left = free, int(free * saved / grown) if grown > 0 else -1

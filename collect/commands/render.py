@@ -5,6 +5,7 @@ Parts of a few episodes lie beside the dataset, in `.NAME.pictures`, until all a
 episodes a part has does not depend on who draws it.
 """
 
+import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from handrail.collect.commands.config import RenderConfig
 from handrail.collect.commands.replay import replay_one_of
@@ -40,6 +42,9 @@ from handrail.datasets.storage.atomic import beside, explained, remove
 
 _FEW = 5  # episodes of a part at least
 _MANY = 1000  # parts at most
+_PICTURES = 32  # of a preview
+_WIDTH = 320  # of one of them [px]
+_LONGEST = 125  # that a picture stays [ms]; a long episode goes by faster than it was
 
 
 def render(config: RenderConfig) -> None:
@@ -162,3 +167,19 @@ def _draw(dataset: OpenDataset, episode: int, writer: EpisodeWriter, seen: Mappi
     if extras.get(SETTINGS):
         extras[SETTINGS] = json.dumps(json.loads(extras[SETTINGS]) | seen)
     writer.save_episode(extras)
+
+
+def preview(root: Path) -> bytes:
+    """Return the first episode that succeeded, else the first, as a moving WebP from the scene's camera."""
+    with open_dataset(root) as dataset:
+        number = next((row["episode_index"] for row in dataset.rows if row.get("success")), 0)
+        seconds = dataset.row(number)["length"] / dataset.info.fps
+        found, pictures = replay_one_of(dataset, number, _PICTURES)
+    if found.largest:
+        raise HandrailError(f"episode {number} of {root}: expected an exact replay, got another motion")
+    first, *others = [Image.fromarray(picture) for picture in pictures]
+    for image in (first, *others):
+        image.thumbnail((_WIDTH, _WIDTH))
+    stay, stream = min(round(1000 * seconds / _PICTURES), _LONGEST), io.BytesIO()
+    first.save(stream, "WEBP", save_all=True, append_images=others, duration=stay, loop=0, quality=70)
+    return stream.getvalue()

@@ -47,7 +47,7 @@ CONTROLLERS = Registry(
         ),
         ControllerSpec(
             "split",
-            f"{_HERE}.baselines.split_controller:split_controller",
+            f"{_HERE}.baselines.unprotected:split_controller",
             "inverse kinematics of the arm alone",
         ),
     ),

@@ -1,23 +1,29 @@
 """The report of a comparison of datasets: the answer first, then how it came about."""
 
+import io
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from handrail.controllers.regular_file import regular
 from handrail.datasets.comparison import figures, tables
 from handrail.datasets.comparison.collection import HOURLY, SUCCESS
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.headline import cautions, headline
-from handrail.datasets.comparison.pictures import first_pictures
 from handrail.datasets.comparison.policies import Outcomes
 from handrail.datasets.comparison.report import Report, contrast_table
+from handrail.datasets.format.schema import video_keys
 from handrail.datasets.presentation import markup
-from handrail.datasets.presentation.drawing import Panel, svg
+from handrail.datasets.presentation.drawing import Panel, address, svg
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, duration, number, percent, percent_span, span
+from handrail.datasets.reading.demonstration import Episode
+from handrail.datasets.reading.digest import video_of
 
 FORMAT = "handrail.comparison/4"
+_SHOWN = 3  # episodes of a group whose first pictures are shown
+_WIDTH = 240  # of a picture [px]
 _REST = "The report has every metric, also where no difference was detected: that does not mean equal."
 _HOW = (
     "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
@@ -155,8 +161,38 @@ def _quality(comparison: Comparison) -> list[str | Table]:
 
 def _pictures(comparison: Comparison) -> str:
     groups = comparison.everything.groups if comparison.config.pictures else ()
-    found = [(group.label, markup.gallery(first_pictures(group))) for group in groups]
+    found = [(group.label, markup.gallery(_first_pictures(group))) for group in groups]
     return "".join(markup.paragraph(label, "quiet") + pictures for label, pictures in found if pictures)
+
+
+def _first_pictures(group: Group) -> list[tuple[str, str]]:
+    """Return captions and pictures, as addresses that hold all of them; unreadable videos are left out."""
+    found = {
+        f"episode {episode.number}, {key.removeprefix('observation.images.')}": _first_picture(key, episode)
+        for episode in group.episodes[:_SHOWN]
+        for key in video_keys(group.info.features)
+    }
+    return [(caption, picture) for caption, picture in found.items() if picture]
+
+
+def _first_picture(key: str, episode: Episode) -> str:
+    import av
+    from av.error import FFmpegError
+
+    try:
+        path, first = video_of(episode.info, episode.meta, key)
+        begin = first / episode.fps
+        with av.open(str(regular(path))) as container:
+            container.seek(int(begin * 1_000_000))
+            for frame in container.decode(container.streams.video[0]):
+                if frame.time is None or frame.time >= begin - 0.5 / episode.fps:
+                    picture, stream = frame.to_image(), io.BytesIO()
+                    picture.thumbnail((_WIDTH, _WIDTH))
+                    picture.save(stream, format="JPEG", quality=80)
+                    return address(stream.getvalue(), "image/jpeg")
+    except (OSError, FFmpegError, ValueError, TypeError, OverflowError, LookupError):
+        return ""
+    return ""
 
 
 def _worst(comparison: Comparison) -> list[str]:

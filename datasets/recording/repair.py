@@ -8,19 +8,20 @@ rebuilt if they are not, to the byte, what the episodes say.
     handrail-edit repair path/to/dataset
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from handrail.datasets.format.episode_rows import with_checksums
+from handrail.datasets.format.episode_rows import EpisodeRows, read_column_types, with_checksums
 from handrail.datasets.format.info_file import read_encodings, summary_files
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest, read_manifest
 from handrail.datasets.format.metadata import Totals
+from handrail.datasets.format.schema import video_keys
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.folder import check_folders, clear_staging, finish_clearing, quarantine
-from handrail.datasets.recording.quarantine import without_damaged
-from handrail.datasets.recording.rewrite import settle
+from handrail.datasets.recording.rewrite import settle, write_anew
+from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.survey import Survey, shortened, survey
 from handrail.datasets.storage.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
@@ -86,7 +87,7 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
             counted = found.totals.episodes == found.episodes
             done[REBUILT] = _rebuild(layout, manifest, found.totals) if counted else ()
             if found.damage and set_aside_damaged:
-                totals = without_damaged(found, manifest)
+                totals = _without_damaged(found, manifest)
                 return RepairReport(layout.root, totals.episodes, lost=found.damage, done=done)
             return RepairReport(layout.root, found.episodes, found.damage, done=done)
 
@@ -135,3 +136,35 @@ def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, .
         else:
             replace(path, data, layout.staging)
     return tuple(rebuilt)
+
+
+def _without_damaged(found: Survey, manifest: Manifest) -> Totals:
+    """Write a dataset anew with its whole episodes; files of the others are kept in `.damaged/`.
+
+    Cut short, nothing has changed, or all of it is done.
+
+    Args:
+        found: Its episodes, some of which are not whole.
+        manifest: Its schema.
+
+    Returns:
+        What the whole ones add up to.
+    """
+    layout, kept = found.layout, list[Path]()
+    for first in (group.first for group in found.groups if any(group.faults)):
+        videos = [layout.video(key, first) for key in video_keys(manifest.features)]
+        kept += [path for path in (*videos, layout.data(first), layout.row(first)) if path.exists()]
+    whole = next((group.first for group in found.groups if not all(group.faults)), None)
+    types = {} if whole is None else read_column_types(layout.row(whole))
+    encodings = read_encodings(layout, manifest)
+    return write_anew(layout.root, manifest, _whole(found, manifest), types, encodings, True, kept)
+
+
+def _whole(found: Survey, manifest: Manifest) -> Iterator[EpisodeSlice]:
+    """Yield the whole episodes, a file group in memory at a time."""
+    for group in found.groups:
+        if not all(group.faults):
+            rows = EpisodeRows.read(found.layout.row(group.first))
+            for place, fault in enumerate(group.faults):
+                if not fault:
+                    yield EpisodeSlice.of(found.layout, manifest, rows.record(place, with_stats=True))

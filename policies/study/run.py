@@ -15,9 +15,9 @@ from handrail.policies.imitation.training.presets import policy_config
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import StudyDesign, check_known
 from handrail.policies.study.jobs import StudyJob, StudyLayout
-from handrail.policies.study.load import load_design
 from handrail.policies.study.power import plan
 from handrail.policies.study.progress import StudyProgress, note_design
+from handrail.policies.study.settings import load_design
 from handrail.policies.study.work import do
 
 _PRELOAD = (

@@ -1,16 +1,23 @@
-"""The settings of every job: the configs it runs with, and of them what its result depends on."""
+"""A study's design from its file; the configs that its jobs run with, and what their results depend on."""
 
+import hashlib
+import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
-from handrail.controllers.errors import HandrailError
+from handrail.collect.world.tasks.catalogue import TASKS
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.strict_toml import read_toml
+from handrail.controllers.typed import decoded
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.training.presets import as_json, resolved
-from handrail.policies.study.design import MOST_DRAWS, StudyDesign
+from handrail.policies.study.design import MOST_DRAWS, StudyDesign, check_known
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
+PRESETS = Path(__file__).parent / "presets"
 BATCH = 10  # episodes, until the next person has a turn
 _FPS = 20  # [Hz]
 _DATASET, _POLICY = Path("dataset"), Path("policy")  # of settings that are only looked at
@@ -20,6 +27,27 @@ _LEARNT = (
     *("eval_split", "eval_steps", "patience", "improvement"),
 )
 _DRIVEN = ("episodes", "seed", "label", "protection", "perturbation", "time_limit")
+
+
+def load_design(name: str) -> StudyDesign:
+    """Return a study by the name of a preset or the path of a TOML file."""
+    path = Path(name).expanduser() if name.endswith(".toml") else PRESETS / f"{name}.toml"
+    if not path.is_file():
+        known = sorted(each.stem for each in PRESETS.glob("*.toml"))
+        raise unknown_name("study", name, [*known, "a file that ends in .toml"])
+    content, where = read_toml(path, "study"), f"study {name}"
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    own = {"name": path.stem, "digest": hashlib.sha256(text.encode()).hexdigest()[:16]}
+    for entry in own.keys() & content.keys():
+        raise HandrailError(
+            f"{where}: expected no {entry}: it follows from the rest, and from the file's name"
+        )
+    if isinstance(tasks := content.get("tasks"), Mapping):
+        check_known("task", tasks, TASKS)
+    design = decoded({**content, **own}, StudyDesign, where)
+    design.check()
+    check_jobs(design)
+    return design
 
 
 def seed_of(design: StudyDesign, cell: StudyCell) -> int:

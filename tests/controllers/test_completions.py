@@ -15,10 +15,10 @@ from handrail.controllers.baselines.arm_completion import (
     LARGEST_RATE,
     LARGEST_SPEED,
     ArmCompletion,
+    BaseFollowingCompletion,
     WeldedBaseCompletion,
     clamp_twist,
 )
-from handrail.controllers.baselines.base_following import BaseFollowingCompletion
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, blended, tool_twist
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State

@@ -8,8 +8,7 @@ from ideal_robot import HOME, LIMITS, MODEL, PERIOD, Robot, asking
 
 from handrail.controllers.baselines.cbf_filter import CbfFilter
 from handrail.controllers.baselines.direct import DirectController
-from handrail.controllers.baselines.split_controller import split_controller
-from handrail.controllers.baselines.unprotected import unprotected_controller
+from handrail.controllers.baselines.unprotected import split_controller, unprotected_controller
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status

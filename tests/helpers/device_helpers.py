@@ -10,7 +10,7 @@ from handrail.collect.operators.scripted.scripted import ScriptedOperator, gains
 from handrail.collect.operators.scripted.steering import MotionGoal, Target
 from handrail.collect.world.task import TaskState
 from handrail.controllers.baselines.direct import DirectController
-from handrail.controllers.baselines.split_controller import split_controller
+from handrail.controllers.baselines.unprotected import split_controller
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import Pose, load_model
 

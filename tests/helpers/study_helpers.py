@@ -13,9 +13,8 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.study.jobs import StudyLayout, jobs
-from handrail.policies.study.load import load_design
 from handrail.policies.study.run import run_study
-from handrail.policies.study.settings import evaluations, fingerprint
+from handrail.policies.study.settings import evaluations, fingerprint, load_design
 
 DESIGN, SMALLEST = (
     (ROOT / "tests" / "data" / "studies" / f"{name}.toml").read_text() for name in ("small", "smallest")

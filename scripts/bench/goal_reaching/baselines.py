@@ -7,8 +7,7 @@ import numpy as np
 
 from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
-from handrail.controllers.baselines.base_following import BaseFollowingCompletion
+from handrail.controllers.baselines.arm_completion import BaseFollowingCompletion, WeldedBaseCompletion
 from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
 from handrail.controllers.baselines.twist_completion import blended as blend
 from handrail.controllers.interface.channels import Channels

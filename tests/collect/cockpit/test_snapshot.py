@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handrail.collect.cockpit.disk import DiskRoom
+from handrail.collect.cockpit.episodes import DiskRoom
 from handrail.collect.cockpit.nearest import NearestPair
 from handrail.collect.cockpit.snapshot import AHEAD, STATUS, Snapshots, base_ahead, hands_ahead, reason
 from handrail.collect.config import DatasetConfig, RecordConfig

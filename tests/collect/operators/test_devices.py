@@ -14,7 +14,7 @@ from handrail.collect.operators.scripted.reach import ReachScript
 from handrail.collect.operators.scripted.scripted import DEVICES, gains_of
 from handrail.collect.operators.scripted.single_axis import clear_order, sweep_clearance
 from handrail.collect.operators.scripted.steering import Gains, MotionGoal
-from handrail.controllers.baselines.split_controller import split_controller
+from handrail.controllers.baselines.unprotected import split_controller
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State

@@ -20,8 +20,8 @@ from handrail.policies.imitation.training.curve import read_curve
 from handrail.policies.imitation.training.training import train
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.jobs import StudyLayout, jobs
-from handrail.policies.study.load import load_design
 from handrail.policies.study.run import run_study
+from handrail.policies.study.settings import load_design
 from handrail.policies.study.work import do
 
 pytestmark = [

@@ -8,7 +8,7 @@ from study_helpers import Starter, run_here
 from handrail.controllers.errors import HandrailError
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.jobs import jobs
-from handrail.policies.study.load import PRESETS, load_design
+from handrail.policies.study.settings import PRESETS, load_design
 
 
 def test_every_job_once_then_none_again(tmp_path, preset):

@@ -23,7 +23,7 @@ from handrail.policies.study.design import (
     StudyDesign,
     TaskDesign,
 )
-from handrail.policies.study.load import load_design
+from handrail.policies.study.settings import load_design
 
 FACTORS = "[factors]\nhand_mpc = 'ee'\nhand_none = 'direct'\njoint_mpc = 'ee'\njoint_none = 'direct'\n"
 

@@ -15,9 +15,8 @@ from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import Flat
 from handrail.policies.study.jobs import jobs
-from handrail.policies.study.load import load_design
 from handrail.policies.study.progress import StudyProgress, read_json
-from handrail.policies.study.settings import evaluations, fingerprint, recording
+from handrail.policies.study.settings import evaluations, fingerprint, load_design, recording
 from handrail.policies.study.work import begin, do, work
 
 
