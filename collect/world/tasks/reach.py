@@ -1,6 +1,7 @@
 """Reach a pose with the tool: the benchmark of the paper's Table I."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,6 +34,7 @@ _COLOURS = (  # of the marker's faces: +x, −x, +y, −y, +z, −z
 )
 _EDGE = 0.18  # of the marker [m]
 _MOST_TRIES = 200
+_POSTURES = 30
 _REACHED = 1e-3  # error of the hand's pose that is left [m, rad]
 _CLEAR = 0.12  # kept to itself and to the floor there, at scale 1 [m]
 _VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
@@ -79,25 +81,42 @@ def _sample_mover(name: str, scale: float, rng: np.random.Generator) -> SceneObj
 def sample_goal_for(model: RobotModel, rng: np.random.Generator) -> Pose:
     """Draw a goal in a robot's world.
 
-    An arm of six joints or more points everywhere: a goal of the paper's, its place made to the measure of
-    the robot's world. A shorter one gets the hand's heading, pitch and roll, and only goals that it can reach
-    from some place of the base, clear of itself and of the floor.
+    An arm of six joints or more gets the paper's goals, made to the measure of the robot's world; a shorter
+    one gets the hand's heading, pitch and roll. A goal that no place of the base puts in reach is not taken.
     """
     description = model.description
     world, joints = description.world, np.count_nonzero(model.moving) - len(description.base.joints)
     lower, upper = (-world.scale, -world.scale, world.goals[0]), (world.scale, world.scale, world.goals[1])
-    if joints >= 6:
-        return sample_goal(rng, lower, upper)
-    collision = CollisionModel(model)
     for _ in range(_MOST_TRIES):
-        goal = Pose(rng.uniform(lower, upper), _rotation(world.pitch, world.roll, rng))
-        q, error = body_configuration(model, description.home, goal)
-        if error < _REACHED and float(np.min(collision.values(q[None]))) >= _CLEAR * world.scale:
-            return goal
+        if joints >= 6:
+            goal = sample_goal(rng, lower, upper)
+            if any(body_configuration(model, q, goal)[1] < _REACHED for q in _postures(model)):
+                return goal
+        else:
+            goal = Pose(rng.uniform(lower, upper), _rotation(world.pitch, world.roll, rng))
+            if _is_clear(model, *body_configuration(model, description.home, goal)):
+                return goal
     raise HandrailError(
         f"task Reach: expected a robot that reaches its goals, got {description.name}, "
         f"which reached none of {_MOST_TRIES}"
     )
+
+
+@lru_cache(maxsize=8)
+def _postures(model: RobotModel) -> tuple[FloatArray, ...]:
+    """Return postures from which a hand is brought to a goal: home, then random ones of the same base."""
+    limits, home = model.description.limits, model.description.home
+    lower, upper = np.clip([limits.position_lower, limits.position_upper], -np.pi, np.pi)
+    others = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, model.size))
+    base = len(model.description.base.joints)
+    others[:, :base] = home[:base]
+    return (home, *others)
+
+
+def _is_clear(model: RobotModel, q: FloatArray, error: float) -> bool:
+    """Return whether the hand is where it shall be but for the error, clear of the robot and of the floor."""
+    clear = _CLEAR * model.description.world.scale
+    return error < _REACHED and float(np.min(CollisionModel(model).values(q[None]))) >= clear
 
 
 def _rotation(pitch: tuple[float, float], roll: tuple[float, float], rng: np.random.Generator) -> FloatArray:

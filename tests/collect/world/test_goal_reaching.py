@@ -1,5 +1,7 @@
 """The goal-reaching protocol: goals come from their distribution, the planner's twist leads to its poses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -7,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handrail.collect.world.tasks.goal_reaching import STEP, StraightPlanner, pose_error, reached, sample_goal
-from handrail.collect.world.tasks.reach import Reach
+from handrail.collect.world.tasks.reach import Reach, sample_goal_for
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
-from handrail.controllers.robot.model import Pose, load_model
+from handrail.controllers.robot.inverse_kinematics import body_configuration
+from handrail.controllers.robot.model import Pose, RobotModel, load_model
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -38,6 +41,21 @@ def test_the_reach_task_draws_the_same_goals(seed):
     episode = Reach().sample(load_model(), np.random.default_rng(seed))
     assert np.array_equal(episode.goal.position, goal.position)
     assert np.allclose(episode.goal.rotation, goal.rotation)
+
+
+def test_goals_are_within_reach_of_a_stiff_wrist():
+    limits, home = load_model().description.limits, load_model().description.home
+    lower, upper = limits.position_lower.copy(), limits.position_upper.copy()
+    lower[5:8], upper[5:8] = home[5:8] - 0.3, home[5:8] + 0.3
+    narrow = replace(limits, position_lower=lower, position_upper=upper)
+    model, rng = RobotModel(replace(load_model().description, limits=narrow)), np.random.default_rng(0)
+    starts = [home, *(home + rng.uniform(-2.0, 2.0, home.shape) for _ in range(60))]
+
+    def error(goal):
+        return min(body_configuration(model, np.clip(q, lower, upper), goal)[1] for q in starts)
+
+    assert max(error(sample_goal_for(model, rng)) for _ in range(30)) < 1e-2
+    assert max(error(sample_goal(rng)) for _ in range(30)) > 0.1
 
 
 @given(SEEDS)
