@@ -20,12 +20,13 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import Pose, RobotModel
 
-_SIZE = (0.28, 0.28, 0.16)  # of the box without its handles [m]
+SIZE = (0.28, 0.28, 0.16)  # of the box without its handles [m]
 _MASS = 1.5  # [kg]
+_LIFTED = 0.03  # [m]
 _AHEAD, _HIGH = 0.68, 1.0  # of the hands at the beginning, from the base and the floor [m]
 _VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
-APART = _SIZE[1] + 1.1 * BAR_LENGTH  # between the hands when they hold it [m]
-GRASP = np.array([0.0, 0.0, (_SIZE[2] - BAR) / 2])  # half-way between the handles, in the box's frame [m]
+APART = SIZE[1] + 1.1 * BAR_LENGTH  # between the hands when they hold it [m]
+GRASP = np.array([0.0, 0.0, (SIZE[2] - BAR) / 2])  # half-way between the handles, in the box's frame [m]
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class CarryBox(Task):
         ]
         on, yaw = tables[0], rng.uniform(-0.15, 0.15)
         x, y = on.front + rng.uniform(0.16, 0.20), on.position[1] + rng.uniform(-0.1, 0.1)
-        thing = crate("box", x, y, on.top, yaw, _SIZE, _MASS)
+        thing = crate("box", x, y, on.top, yaw, SIZE, _MASS)
         q = _sample_start(model, rng)
         return Start(Scene((*tables, thing, *sample_obstacles(model, q, rng, self.clearance)), _VIEW), q)
 
@@ -66,8 +67,10 @@ class CarryBox(Task):
         return np.concatenate([pose_numbers(state.pose("box")), *tops, obstacle_features(state.start.scene)])
 
     def aim(self, state: TaskState) -> Aim:
-        """Return the box; the hands belong at its handles, either side of that."""
+        """Return the box, or the table once that is lifted: half-way between where the hands belong."""
         now = state.pose("box")
+        if now.position[2] > state.object("box").position[2] + _LIFTED:
+            return Aim("table", state.object("table").top_centre + [0.0, 0.0, SIZE[2] / 2] + GRASP)
         return Aim("box", now.position + now.rotation @ GRASP)
 
     def outcome(self, state: TaskState) -> Verdict:
@@ -76,7 +79,7 @@ class CarryBox(Task):
         if now.position[2] < 0.4 or now.rotation[2, 2] < np.cos(0.8):
             return Verdict(failure="dropped")
         inside = np.abs(now.position[:2] - goal.position[:2]) < goal.shape.size[:2] / 2
-        down = now.position[2] < goal.top + _SIZE[2] / 2 + 0.02 and "box" in state.still and inside.all()
+        down = now.position[2] < goal.top + SIZE[2] / 2 + 0.02 and "box" in state.still and inside.all()
         return Verdict(success=bool(down) and state.left_alone(now, GRASP, APART))
 
 

@@ -1,5 +1,7 @@
 """Tasks of two hands: a scripted person does them in each mode that fits; a pair stays together."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -8,9 +10,11 @@ from places import TIAGO
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller, build_env, build_session
+from handrail.collect.world.tasks.carry_box import GRASP, SIZE
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import Pose
 
 ROBOT = TIAGO
 
@@ -43,6 +47,27 @@ def test_a_person_does_it_with_both_hands(task, mode):
         mask &= ~channels.mask("pair.wx", "pair.wy")  # which the MPC levels
     for frame in watcher.frames:
         np.testing.assert_array_equal(frame.intent.mask, mask)
+
+
+def test_hands_are_led_to_the_box_then_to_where_it_stands_on_the_other_table():
+    env = build_env(SessionConfig(task="carry_box", mode="pair", robot=ROBOT), 20)
+    env.reset(seed=0)
+    state = env.task_state()
+    box, there = state.pose("box"), state.object("table").top_centre + np.array([0.0, 0.0, SIZE[2] / 2])
+
+    def told(place, away):
+        tools = tuple(Pose(place + GRASP + side * way, np.eye(3)) for side in (1, -1) for way in [away])
+        now = replace(state, poses={**state.poses, "box": Pose(place, box.rotation)}, tools=tools)
+        now = replace(now, openings=(1.0, 1.0), still=frozenset({"box"}))
+        return env.task.aim(now), env.task.outcome(now).success
+
+    far = np.array([0.0, 0.5, 0.0])
+    aim, success = told(box.position, far)
+    assert (aim.name, success) == ("box", False)
+    assert told(box.position + [0.0, 0.0, 0.1], far)[0].name == "table"
+    aim, success = told(there, far)
+    assert success
+    np.testing.assert_allclose(aim.position, there + GRASP)
 
 
 def test_a_pair_stays_together_while_the_base_drives_a_circle():
