@@ -1,6 +1,6 @@
 """The nearest pair of the robot and itself, or of the robot and what stands around."""
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -8,15 +8,6 @@ from handrail.collect.world.geometry import ROBOT_BIT
 from handrail.collect.world.gl import MjData, MjModel, mujoco
 
 _FAR = 0.5  # farther is not looked for [m]
-
-
-@dataclass(frozen=True)
-class Nearest:
-    """Two points, one on each, (2, 3), how far apart their surfaces are [m], and of what they are."""
-
-    points: tuple[float, ...]
-    distance: float
-    names: tuple[str, str]
 
 
 class NearestPair:
@@ -38,8 +29,8 @@ class NearestPair:
         self._first, self._second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
         self._radii = model.geom_rbound[self._first] + model.geom_rbound[self._second]
 
-    def find(self, data: MjData) -> Nearest | None:
-        """Return the nearest pair now; None where nothing is near.
+    def find(self, data: MjData) -> dict[str, Any] | None:
+        """Return the nearest pair now: its points (6,), distance [m] and names; None where nothing is near.
 
         Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer.
         """
@@ -56,7 +47,8 @@ class NearestPair:
         if found is None:
             return None
         first, second, points = found
-        return Nearest(points, round(best, 4), (self._name(first), self._name(second)))
+        names = self._name(first), self._name(second)
+        return {"points": points, "distance": round(best, 4), "names": names}
 
     def _name(self, geom: int) -> str:
         name = self._model.geom(geom).name or self._model.body(self._model.geom_bodyid[geom]).name

@@ -1,7 +1,6 @@
 """What the page shows of a moment: one small value, many times a second."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -132,7 +131,6 @@ class Snapshots:
         setting, env, state = person.setting, self._env, view.state
         if person.phase is not Phase.DRIVING and not np.any(state.commanded):
             self._undo_to = state.time
-        nearest = self._nearest.find(env.simulation.data)
         return {
             "stamp": round(stamp, 4),
             "time": round(state.time, 3),
@@ -152,7 +150,7 @@ class Snapshots:
             "speed": setting.speed,
             "locked": setting.locked,
             "mask": np.flatnonzero(person.meaning.mask(setting)).tolist(),
-            "nearest": asdict(nearest) if nearest else None,
+            "nearest": self._nearest.find(env.simulation.data),
             "q": np.round(state.q, 3).tolist(),
             "v": np.round(state.commanded, 3).tolist(),
             **self._controlled(view),

@@ -34,8 +34,8 @@ from handrail.datasets.statistics.contrast import (
     Value,
     adjusted,
     contrast,
+    mean_value,
 )
-from handrail.datasets.statistics.means import mean_value
 from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, difference_of_means, permutation_p
 
 FORMAT = "handrail.people/3"

@@ -14,8 +14,7 @@ from handrail.datasets.quality.scale import Scale
 from handrail.datasets.quality.units import why_not
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply, Episode
 from handrail.datasets.reading.load import each_opened
-from handrail.datasets.statistics.contrast import Value
-from handrail.datasets.statistics.means import mean_value
+from handrail.datasets.statistics.contrast import Value, mean_value
 
 FRAMES = 2048  # of a group at most, for what compares every frame with every other
 

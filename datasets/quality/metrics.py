@@ -6,8 +6,6 @@ smoothness". Chattering: Pizarro Bejarano et al. 2023, "Multi-step model predict
 
 import numpy as np
 
-from handrail.controllers.errors import HandrailError
-
 CUTOFF = 10.0  # [Hz]
 AMPLITUDE_THRESHOLD = 0.05
 ZERO_PADDING = 4  # powers of two
@@ -27,7 +25,6 @@ def sparc(speed: np.ndarray, fs: float) -> float:
     Returns:
         The measure (minimum jerk: about −1.4), or NaN if nothing moves or there are fewer than two samples.
     """
-    speed = _checked("speed", speed, 1, fs)
     if not _moves(speed):
         return float("nan")
     size = 2 ** (int(np.ceil(np.log2(len(speed)))) + ZERO_PADDING)
@@ -55,7 +52,6 @@ def ldlj(speed: np.ndarray, fs: float) -> float:
     Returns:
         The measure (minimum jerk: about −5.2), or NaN if nothing moves or there are fewer than three samples.
     """
-    speed = _checked("speed", speed, 1, fs)
     jerk = np.diff(speed, 2) * fs**2
     if not _moves(speed) or not jerk.any():
         return float("nan")
@@ -88,7 +84,6 @@ def rate_of_change(command: np.ndarray, fs: float) -> float:
         The measure, a velocity's in [m/s², rad/s²], or NaN if there are fewer than two samples or one is not
         finite.
     """
-    command = _checked("command", command, 2, fs)
     if len(command) < 2 or not np.isfinite(command).all():
         return float("nan")
     changes = np.diff(command, axis=0) * fs
@@ -109,7 +104,6 @@ def high_frequency_content(command: np.ndarray, fs: float) -> float:
     Returns:
         The measure [unit · Hz], or NaN if there are fewer than two samples or one is not finite.
     """
-    command = _checked("command", command, 2, fs)
     size = len(command)
     if size < 2 or not np.isfinite(command).all():
         return float("nan")
@@ -130,24 +124,8 @@ def corrections(
         owned: Where the operator owned a channel, `(N, d)`; elsewhere nothing was asked.
         tolerance: Largest difference that is no correction.
     """
-    asked, commanded, owned = np.asarray(asked, float), np.asarray(commanded, float), np.asarray(owned, bool)
-    if asked.ndim != 2 or not asked.shape == commanded.shape == owned.shape:
-        raise HandrailError(
-            "asked, commanded, owned: expected one and the same shape (N, d), "
-            f"got {asked.shape}, {commanded.shape}, {owned.shape}"
-        )
     on = np.any(owned & (np.abs(commanded - asked) > tolerance), axis=1)
     return int(np.count_nonzero(np.diff(on, prepend=False)))
-
-
-def _checked(name: str, values: np.ndarray, ndim: int, fs: float) -> np.ndarray:
-    values = np.asarray(values, float)
-    if values.ndim != ndim:
-        expected = "(N,)" if ndim == 1 else "(N, d)"
-        raise HandrailError(f"{name}: expected the shape {expected}, got {values.shape}")
-    if not fs > 0:
-        raise HandrailError(f"fs: expected a positive rate [Hz], got {fs}")
-    return values
 
 
 def _moves(speed: np.ndarray) -> bool:

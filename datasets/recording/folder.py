@@ -7,6 +7,7 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
+from handrail.datasets.recording.survey import shortened
 from handrail.datasets.storage.atomic import move, remove
 from handrail.datasets.storage.lock import LOCK_NAME
 
@@ -39,8 +40,8 @@ def check_target(layout: Layout, overwrite: bool) -> None:
         return
     if not is_dataset(layout):
         raise HandrailError(
-            f"{str(root)!r}: expected a missing or empty folder, found {_few(names)}; this is no LeRobot"
-            " dataset (no meta/info.json) and is never removed: choose another folder"
+            f"{str(root)!r}: expected a missing or empty folder, found {shortened(names, ', ')}; this"
+            " is no LeRobot dataset (no meta/info.json) and is never removed: choose another folder"
         )
     if not overwrite:
         raise HandrailError(
@@ -55,8 +56,8 @@ def check_target(layout: Layout, overwrite: bool) -> None:
     check_folders(layout)
     if foreign := _foreign(layout):
         raise HandrailError(
-            f"dataset {str(root)!r}: found what Handrail did not write, {_few(foreign)}; --overwrite"
-            " removes only its own files: move this away, or choose another root"
+            f"dataset {str(root)!r}: found what Handrail did not write, {shortened(foreign, ', ')};"
+            " --overwrite removes only its own files: move this away, or choose another root"
         )
 
 
@@ -142,7 +143,3 @@ def _foreign(layout: Layout) -> list[str]:
     found = [path for top in tops for path in (top, *top.rglob("*")) if path.is_symlink() or path.is_file()]
     ours = {path for path in found if not path.is_symlink() and _OURS.fullmatch(layout.relative(path))}
     return sorted(layout.relative(path) for path in found if path not in ours)
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:3]) + (" …" if len(names) > 3 else "")

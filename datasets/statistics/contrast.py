@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.statistics.resampling import Interval
+from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_mean
 
 LEVEL = 0.05  # below which a p that is adjusted for their number counts
 POWER = 0.8
@@ -158,6 +158,25 @@ class Contrast(Value):
     def content(self) -> dict[str, Any]:
         """The entry in the JSON of every report."""
         return super().content | {"detected": self.detected, "detectable": self.seen}
+
+
+def mean_value(
+    measure: Measure, label: str, values: FloatArray, rng: np.random.Generator | None, **more: Any
+) -> Value:
+    """Return the mean of a measure over the units that have a value, NaN where one has none.
+
+    Its interval is there for five or more, and if there is an `rng` to resample them.
+    """
+    known = values[np.isfinite(values)]
+    return Value(
+        measure=measure,
+        label=label,
+        values=values,
+        estimate=float(known.mean()) if len(known) else None,
+        interval=bootstrap_mean(known, rng) if rng and len(known) >= FEWEST else None,
+        counts=(len(known),),
+        **more,
+    )
 
 
 def contrast(one: Value, other: Value, found: Estimate, **more: Any) -> Contrast:

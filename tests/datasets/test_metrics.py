@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.controllers.errors import HandrailError
 from handrail.datasets.quality.metrics import (
     corrections,
     high_frequency_content,
@@ -98,18 +97,3 @@ def test_corrections_are_counted_when_they_switch():
 def test_what_is_no_command_has_no_chattering(command):
     assert np.isnan(rate_of_change(command, 50.0))
     assert np.isnan(high_frequency_content(command, 50.0))
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: sparc(np.zeros((3, 2)), 50.0), "shape"),
-        (lambda: ldlj(BELL, 0.0), "positive rate"),
-        (lambda: rate_of_change(np.zeros(9), 50.0), r"command: expected the shape \(N, d\), got \(9,\)"),
-        (lambda: high_frequency_content(np.zeros((9, 1)), -1.0), "positive rate"),
-        (lambda: corrections(np.zeros((3, 2)), np.zeros((3, 1)), np.ones((3, 2), bool)), "one and the same"),
-    ],
-)
-def test_wrong_arguments(call, words):
-    with pytest.raises(HandrailError, match=words):
-        call()

@@ -230,11 +230,6 @@ def _piqp(loop: TimingLoop) -> Take:
 
 
 PEERS: dict[str, Callable[[TimingLoop], Take]] = {
-    "ipopt": _ipopt,
-    "mink": _mink,
-    "pink": _pink,
-    "own_qp": _own_qp,
-    "daqp": _daqp,
-    "piqp": _piqp,
+    each.__name__.strip("_"): each for each in (_ipopt, _mink, _pink, _own_qp, _daqp, _piqp)
 }
 """The solvers by name, as `speed.config.PEERS` lists them."""

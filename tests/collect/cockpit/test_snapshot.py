@@ -150,9 +150,11 @@ def test_the_nearest_pair_is_the_nearest_of_all(env):
     pairs = own + [(first, second) for first in robot for second in scene]
     best = min(mujoco.mj_geomDistance(model, data, *pair, 0.5, line) for pair in pairs)
     assert found is not None
-    assert found.distance == pytest.approx(best, abs=1e-4)
-    assert np.linalg.norm(np.subtract(found.points[:3], found.points[3:])) == pytest.approx(best, abs=3e-3)
-    assert all(found.names)
+    assert found["distance"] == pytest.approx(best, abs=1e-4)
+    assert np.linalg.norm(np.subtract(found["points"][:3], found["points"][3:])) == pytest.approx(
+        best, abs=3e-3
+    )
+    assert all(found["names"])
 
 
 def test_a_moment_is_small_and_finite(env, person):

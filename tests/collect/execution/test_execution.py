@@ -223,6 +223,6 @@ def test_all_cores_are_those_that_this_process_may_use(files, expected, tmp_path
 
 
 def test_a_cluster_without_ray_says_how_to_install_it(monkeypatch):
-    monkeypatch.setattr("handrail.collect.execution.config.find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(HandrailError, match=r"--ray auto: expected ray, found none; .* '.\[cluster\]'"):
         ExecutionConfig(ray="auto").check_execution()

@@ -129,7 +129,7 @@ def test_a_second_study_in_a_folder_is_told_what_the_first_is(tmp_path, preset):
 
 @pytest.mark.parametrize("missing", ["torch", "accelerate"])
 def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path, preset, monkeypatch):
-    monkeypatch.setattr("handrail.policies.imitation.config.find_spec", lambda name: name != missing or None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: name != missing or None)
     starter = Starter()
     with pytest.raises(HandrailError, match=f"handrail-study: expected {missing}"):
         run_here(StudyConfig(preset, str(tmp_path / "study")), starter)
