@@ -14,7 +14,6 @@ WRONG = (
     ("goal_reaching", "--workers 1000", "--workers 1000: expected a whole number from 1 to 256"),
     ("goal_reaching", "--json /nowhere/at/all.json", "/nowhere/at/all.json: expected a file in an existing"),
     ("goal_reaching", "--page results.txt", "--page results.txt: expected a .md file"),
-    ("goal_reaching", f"--report {__file__}", "expected a folder, found a file"),
     ("cases", "e", "unknown case 'e': expected one of a, b, c, d"),
     ("cases", "a --seconds -1", "--seconds: expected a number >= 0"),
     ("speed", "--updates 1", "--updates: expected a whole number >= 10"),
