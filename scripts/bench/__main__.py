@@ -1,41 +1,18 @@
 """The benches: `.venv/bin/python -m handrail.scripts.bench NAME`, from a clone; the wheel has none."""
 
 import sys
+import tomllib
+from pathlib import Path
 
 from handrail.controllers.errors import unknown_name
 from handrail.scripts import cli
 from handrail.scripts.bench.report import PROGRAM
 from handrail.scripts.commands import Verb
 
-
-def _bench(help: str, settings: str, body: str) -> Verb:
-    return Verb(help, f"scripts.bench.{settings}", f"scripts.bench.{body}")
-
-
+_TABLE = tomllib.loads((Path(__file__).parent / "benches.toml").read_text(encoding="utf-8"))
 BENCHES = {
-    "goal_reaching": _bench(
-        "the paper's Table I: controllers on the same goals",
-        "goal_reaching.config:BenchmarkConfig",
-        "goal_reaching.benchmark:main",
-    ),
-    "cases": _bench("the paper's cases A, B and C", "cases.showcase:ShowcaseConfig", "cases.showcase:main"),
-    "speed": _bench(
-        "the controller's update over degrees of freedom, pairs and stages, beside other solvers",
-        "speed.config:SpeedConfig",
-        "speed.speed:main",
-    ),
-    "operators": _bench(
-        "scripted operators in every task and mode", "operators.file:TrialsConfig", "operators.trials:main"
-    ),
-    "rl": _bench(
-        "trains the reinforcement-learning baseline (SAC)", "rl.config:TrainRlConfig", "rl.train:main"
-    ),
-    "latency": _bench(
-        "how soon the robot does what the cockpit's page asks",
-        "latency.measure:LatencyConfig",
-        "latency.measure:main",
-    ),
-    "soak": _bench("hours of commands and faults", "soak.soak:SoakConfig", "soak.soak:main"),
+    name: Verb(help, f"scripts.bench.{settings}", f"scripts.bench.{body}")
+    for name, (help, settings, body) in _TABLE.items()
 }
 
 
