@@ -1,10 +1,7 @@
 """Laws of a robot with two hands: each is steered, both are, as a pair; what nobody steers stays."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from places import TIAGO
 from scipy.spatial.transform import Rotation
 
 from handrail.controllers.errors import HandrailError
@@ -17,9 +14,10 @@ from handrail.controllers.objectives.hold import end_effector_hold
 from handrail.controllers.objectives.ownership import leaves_freedom, steered_joints
 from handrail.controllers.objectives.together import together, together_parameters
 from handrail.controllers.objectives.tray import tray_levelling
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
 
-MODEL = load_model(TIAGO)
+MODEL = load_model("tiago_pro")
 CHANNELS = Channels.of(MODEL.description)
 HOME = MODEL.description.home
 LEFT, RIGHT = (np.array(each) for each in MODEL.description.moves)
@@ -161,7 +159,7 @@ def test_grippers_are_the_hands(mpc):
     assert not Intent(np.zeros(1), np.zeros(1, bool), (1.0, 0.0, 0.0)).of_hands(2).is_finite
 
 
-TEXT = Path(TIAGO).read_text()
+TEXT = ROBOTS.find("tiago_pro").file.read_text()
 
 
 @pytest.mark.parametrize(

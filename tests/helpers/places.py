@@ -4,7 +4,6 @@ from pathlib import Path
 
 HELPERS = Path(__file__).parent
 ROOT = HELPERS.parent.parent
-TIAGO = str(ROOT / "docs" / "examples" / "tiago_pro.toml")  # has two hands
 FLOORS = ("controllers", "datasets", "collect", "policies", "scripts")  # from the ground up
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -22,7 +21,6 @@ _ASIDE = (1.86, *_AHEAD[1:])  # the hand to the left
 _TURN = 12.0  # period of the circles [s]
 _START = np.array([0.0134, 0.39])  # where the base stands when the hand is at the held point
 _HELD = (1.5, 0.4, 0.7)
-_TIAGO = str(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
 _HANDS = ((0.759, 0.204, 0.813), (0.759, -0.204, 0.813))  # of TIAGo Pro at home, the base at 0
 _OF_HAND, _OF_BASE = ("ee.vx", "ee.vy", "ee.vz"), ("base.vx", "base.vy", "base.wz")
 
@@ -74,9 +72,9 @@ def _hand_held() -> PaperCase:
 
 
 def _hands_held() -> PaperCase:
-    title = "D: the operator drives the base in a circle; both hands stay at their points"
-    q = np.append(np.zeros(3), load_description(_TIAGO).home[3:])
-    return _base_circle("d", title, q, _HANDS, 0.15, np.pi / 2, _TIAGO)
+    robot, title = "tiago_pro", "D: the operator drives the base in a circle; both hands stay at their points"
+    q = np.append(np.zeros(3), load_description(robot).home[3:])
+    return _base_circle("d", title, q, _HANDS, 0.15, np.pi / 2, robot)
 
 
 def _base_circle(

@@ -120,7 +120,7 @@ def build_controller(model: RobotModel) -> MaskedMpc:
 def parameters(case: PaperCase) -> Mapping[str, FloatArray]:
     """Return the parameters of the objectives in a case, by objective."""
     points = case.held or (np.zeros(3),)
-    names = ("hold",) if len(points) == 1 else ("left.hold", "right.hold")
+    names = (hand.named("hold") for hand in load_model(case.robot).description.hands)
     poses = (Pose(np.array(point), np.eye(3)) for point in points)
     return {
         name: switched(hold_parameters(pose), bool(case.held))

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
 from time import perf_counter, thread_time
 
 import numpy as np
@@ -29,14 +28,13 @@ _EPISODE = 100  # updates in one scene
 _NEAREST, _FARTHEST = 0.12, 0.30  # between robot and obstacle at home [m]
 _SPEED = 0.4  # [m/s, rad/s]
 _MODES = (("ee",), ("base",), ("base", "ee"), ("joint",))
-_TIAGO = str(Path(__file__).parents[3] / "docs" / "examples" / "tiago_pro.toml")
 _ROBOTS = {  # by degrees of freedom: the description, and words in the names of joints that are left out
     8: ("lekiwi", ()),
     9: ("ridgeback_ur10", ()),
     10: ("ridgeback_panda", ()),
-    13: (_TIAGO, ("left_",)),
-    18: (_TIAGO, ("head_",)),
-    20: (_TIAGO, ()),
+    13: ("tiago_pro", ("left_",)),
+    18: ("tiago_pro", ("head_",)),
+    20: ("tiago_pro", ()),
 }
 
 

@@ -5,7 +5,6 @@ import pytest
 from page_driver import LOST
 from page_levers import GRIP, HOLD, SHIFT, Pad
 from page_shots import shoot
-from places import TIAGO
 from playwright.sync_api import expect
 
 pytestmark = pytest.mark.slow
@@ -152,7 +151,7 @@ def two(on_bench):
     """Open a page of a robot with two hands."""
 
     def opened(mode="ee", kind=Two, script=""):
-        made, driver = on_bench(mode, TIAGO, script=script)
+        made, driver = on_bench(mode, "tiago_pro", script=script)
         driver.begin()
         return kind(made, driver)
 

@@ -16,7 +16,6 @@ from page_learner import Learner
 from page_levers import Keys, Pad
 from page_pair import PairDriver, PairKeys, PairLearner, PairPad, carry_box
 from page_recording import recording, saved
-from places import TIAGO
 
 pytestmark = pytest.mark.slow
 PATIENT = ("--time_limit", "180")  # who tries what each key does takes longer, on a busy computer above all
@@ -93,7 +92,7 @@ def test_who_tries_what_each_lever_does_does_the_task(
 def test_who_knows_where_the_box_is_carries_it_with_both_hands(new_page, tmp_path, levers, device):
     """`HANDRAIL_CARRIED=5` for five times; how many of them went well is printed."""
     episodes, person = int(os.environ.get("HANDRAIL_CARRIED", "1")), (PairDriver, PairLearner)
-    drive(new_page, tmp_path / "d", carry_box, levers, episodes, "pair", person, "--robot", TIAGO)
+    drive(new_page, tmp_path / "d", carry_box, levers, episodes, "pair", person, "--robot", "tiago_pro")
     check(tmp_path / "d", episodes, device, "pair", max(1, episodes * 3 // 5))
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from places import TIAGO
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.snapshot import AHEAD, Snapshots, hands_ahead
@@ -24,7 +23,7 @@ from handrail.datasets.recording.frames import Frame
 
 @pytest.fixture(scope="module")
 def env():
-    made = build_env(SessionConfig(task="reach", robot=TIAGO, hand="right"), 20)
+    made = build_env(SessionConfig(task="reach", robot="tiago_pro", hand="right"), 20)
     made.reset(seed=3)
     yield made
     made.close()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from device_players import PlayedHid
 from driven_person import CONTROLS, FORWARD, Driven
-from places import TIAGO
 
 from handrail.collect.devices.control_map import Steered, load_map
 from handrail.collect.devices.spacemouse import SpaceMice
@@ -15,7 +14,7 @@ from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.operators.person.inputs import Ask
 from handrail.controllers.robot.model import load_model
 
-MODEL = load_model(TIAGO)
+MODEL = load_model("tiago_pro")
 OTHER = {"gamepad": "a", "spacemouse": "button_2", "keyboard": "/"}
 GRIPS = {"gamepad": ("left_trigger", "right_trigger"), "keyboard": ("n", "m")}
 

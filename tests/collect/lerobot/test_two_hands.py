@@ -3,7 +3,6 @@
 import gymnasium
 import numpy as np
 import pytest
-from places import TIAGO
 
 from handrail.collect.lerobot import (
     HandrailEnvConfig,
@@ -19,7 +18,7 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.description import load_description
 
-ROBOT = TIAGO
+ROBOT = "tiago_pro"
 CHANNELS = Channels.of(load_description(ROBOT))
 GRIPPERS = ("left.gripper.pos", "right.gripper.pos")
 

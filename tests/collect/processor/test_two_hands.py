@@ -14,7 +14,6 @@ from lerobot.robots.openarm_follower import openarm_follower
 from lerobot.robots.openarm_follower.config_openarm_follower import OpenArmFollowerConfigBase
 from lerobot.robots.reachy2 import Reachy2RobotConfig, robot_reachy2
 from lerobot.robots.so_follower import SOFollowerConfig
-from places import TIAGO
 from processor_helpers import PERIOD, Drive
 
 from handrail.collect.processor.units import robot_units
@@ -66,7 +65,7 @@ def reachy2(_):
     joints = robot_reachy2.REACHY2_L_ARM_JOINTS | robot_reachy2.REACHY2_R_ARM_JOINTS
     joints |= robot_reachy2.REACHY2_NECK_JOINTS
     names = tuple(name.removesuffix(".pos") for name in joints if "gripper" not in name)
-    tiago = load_description(TIAGO)
+    tiago = load_description("tiago_pro")
     limits = type(tiago.limits)(**{name: each[:20] for name, each in vars(tiago.limits).items()})
     return replace(tiago, arms=(replace(tiago.arms[0], joints=names),), home=tiago.home[:20], limits=limits)
 
@@ -76,7 +75,7 @@ def ahead(hand, speed):
 
 
 def test_each_hand_goes_and_closes_as_it_is_told_and_a_pair_stays_together():
-    drive = Drive(robot=TIAGO)
+    drive = Drive(robot="tiago_pro")
     models = [drive.model.with_hand(hand) for hand in HANDS]
     gripper = drive.model.description.hands[0].gripper
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
-from places import TIAGO
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -16,7 +15,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import Pose
 
-ROBOT = TIAGO
+ROBOT = "tiago_pro"
 
 
 SPEED = 0.08  # of the base [m/s]

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from places import TIAGO
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -19,7 +18,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 
-ROBOT = TIAGO
+ROBOT = "tiago_pro"
 TOOLS = ("left.tool", "right.tool")
 
 

@@ -166,7 +166,7 @@ def test_a_gripper_that_does_not_grip_is_the_open_one(shipped):
     with pytest.raises(HandrailError, match="grip of a simulation: expected none without grips"):
         Simulation(model, Scene(), home, 0.03, grip=(0.05,) * len(model.description.hands), grips=False)
     moved = np.linalg.norm(ends[0][-1] - model.pose(home).position)
-    assert moved > 0.1 * model.description.world.scale
+    assert moved > 0.05 * model.description.world.scale  # far more than the ends may differ by
     np.testing.assert_allclose(ends[1], ends[0], atol=5e-4)
     np.testing.assert_allclose(ends[2], ends[0], atol=2e-3)
 
@@ -178,7 +178,8 @@ def test_velocity_commands_are_tracked(robot):
         limits = env.model.description.limits
         for joint in range(env.model.size):
             env.reset(seed=0)
-            near = limits.position_upper[joint] - env.state().q[joint] < 1.0
+            q = env.state().q[joint]
+            near = limits.position_upper[joint] - q < min(1.0, q - limits.position_lower[joint])
             sign = -1.0 if joint == 4 or near else 1.0  # up, not into the floor; not to a limit
             speed = 0.4 * limits.velocity[joint]
             target = closing(env.model, grip=0.0).astype(np.float32)

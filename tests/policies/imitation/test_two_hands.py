@@ -1,7 +1,6 @@
 """Policies of robots with two hands: each hand sees for itself, and what they write is each hand's own."""
 
 import numpy as np
-import places
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -15,7 +14,7 @@ from handrail.policies.imitation.interface.checkpoint import MIXED, PolicyMeta, 
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import CompletedRobot, Completion
 
-TIAGO = load_description(places.TIAGO)
+TIAGO = load_description("tiago_pro")
 CHANNELS, JOINTS, N = Channels.of(TIAGO), TIAGO.joints, len(TIAGO.joints)
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 HANDS = ("left", "right")

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from places import TIAGO
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -20,7 +19,7 @@ from handrail.controllers.registry import fitting
 from handrail.controllers.robot.model import load_model
 
 PERIOD = 0.05  # [s]
-MODEL = load_model(TIAGO)
+MODEL = load_model("tiago_pro")
 CLOCK = [100.0]
 
 
@@ -70,7 +69,7 @@ def test_a_mode_of_channels_that_a_robot_lacks_is_no_choice():
     modes = build_modes(SessionConfig(), build_env(SessionConfig(robot="bi_so101"), 20))
     assert {"both", "pair"} < modes.keys()
     assert "hand+torso" not in modes
-    assert "hand+torso" in build_modes(SessionConfig(), build_env(SessionConfig(robot=TIAGO), 20))
+    assert "hand+torso" in build_modes(SessionConfig(), build_env(SessionConfig(robot="tiago_pro"), 20))
 
 
 def test_a_hand_that_there_is_not_changes_nothing():
@@ -161,7 +160,7 @@ def test_the_other_hand_takes_over_without_a_jolt(mode):
         def see(self, frame):
             frames.append(frame)
 
-    config = SessionConfig(task="reach", mode=mode, robot=TIAGO, physics=False)
+    config = SessionConfig(task="reach", mode=mode, robot="tiago_pro", physics=False)
     env = build_env(config, 20)
     session = build_session(config, env, (Watcher(),), person=Switching(env, mode))
     replace(session, realtime=False).run(0)
@@ -177,7 +176,7 @@ def test_the_other_hand_takes_over_without_a_jolt(mode):
 
 def test_a_pair_parts_while_that_is_moved_and_stays_as_it_was_left():
     """What keeps hands together rests while they part; then it keeps where they are, not where they were."""
-    config = SessionConfig(task="reach", mode="pair", robot=TIAGO, physics=False)
+    config = SessionConfig(task="reach", mode="pair", robot="tiago_pro", physics=False)
     env, meaning = build_env(config, 20), Steering("pair").person.meaning
     env.reset(seed=0)
     controller = build_controller(MODES["pair"], env.model, 20)
