@@ -1,17 +1,54 @@
 """Writes what a session shows into a dataset, episode by episode."""
 
+import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
 from handrail.datasets.recording.frames import Frame, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter, Scalar
+from handrail.datasets.storage.atomic import explained
 
 _COLUMNS = (
     *("success", "failure_reason", "seed", "started", "wall_time", "brakes", "late", "undos"),
     *("contact_onsets", "contact_periods"),
 )
 """What an episode's metadata says of its outcome."""
+
+
+class _Aside:
+    """Pictures of frames that an undo may take back, in a file: minutes of them do not fit into memory.
+
+    Args:
+        folder: where the file is; it has no name, and goes with the process.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        with explained("cannot keep the pictures of an episode"):
+            self.file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 -- open as long as the episode
+        self._shapes: dict[str, tuple[int, ...]] = {}
+
+    def put(self, frame: Frame) -> Frame:
+        """Return a frame without its pictures, which replace those of its number."""
+        self._shapes = {name: image.shape for name, image in frame.images.items()}
+        pictures = b"".join(image.tobytes() for image in frame.images.values())
+        with explained("cannot keep the pictures of an episode"):
+            self.file.seek(frame.number * len(pictures))
+            self.file.write(pictures)
+        return replace(frame, images={})
+
+    def take(self, frame: Frame) -> Frame:
+        """Return a frame with its pictures."""
+        sizes = {name: int(np.prod(shape)) for name, shape in self._shapes.items()}
+        with explained("cannot read the pictures of an episode"):
+            self.file.seek(frame.number * sum(sizes.values()))
+            read = {name: np.frombuffer(self.file.read(size), np.uint8) for name, size in sizes.items()}
+        images = {name: read[name].reshape(shape) for name, shape in self._shapes.items()}
+        return replace(frame, images=images)
 
 
 class Recorder:
@@ -28,30 +65,45 @@ class Recorder:
     def __init__(self, task: str, columns: Mapping[str, Scalar]) -> None:
         self._task, self._columns = task, columns
         self._undoable: list[Frame] = []
+        self._aside: _Aside | None = None
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Drop what an episode that ended early left open."""
         self._undoable.clear()
+        self._close()
         if self.writer.open_frames:
             self.writer.discard_episode()
 
     def see(self, frame: Frame) -> None:
         """Add a frame, once no undo can take it back."""
         del self._undoable[frame.number - self.writer.open_frames :]
+        if frame.images and frame.number >= frame.safe:
+            self._aside = self._aside or _Aside(self.writer.staging)
+            frame = self._aside.put(frame)
         self._undoable.append(frame)
         self._add(frame.safe)
 
     def _add(self, safe: int) -> None:
         """Write the frames up to a number."""
         while self._undoable and self.writer.open_frames < safe:
-            self.writer.add_frame(frame_row(self._undoable.pop(0)), self._task)
+            frame = self._undoable.pop(0)
+            if self._aside and not frame.images:
+                frame = self._aside.take(frame)
+            self.writer.add_frame(frame_row(frame), self._task)
+
+    def _close(self) -> None:
+        if self._aside:
+            self._aside.file.close()
+        self._aside = None
 
     def end(self, outcome: Outcome) -> None:
         """Save the episode with its outcome; forget it if the operator threw it away or begins it again."""
         if not outcome.kept:
+            self._close()
             self.writer.discard_episode()
             return
         self._add(outcome.frames)
+        self._close()
         row: dict[str, Scalar] = dict(self._columns)
         if self.writer.has_column("operator_says"):  # datasets of old have no such column
             row["operator_says"] = outcome.operator_says

@@ -129,6 +129,11 @@ class EpisodeWriter:
         return cls(layout, manifest, totals, lock, types, report)
 
     @property
+    def staging(self) -> Path:
+        """The folder of files that are not published yet, inside the dataset."""
+        return self._layout.staging
+
+    @property
     def num_episodes(self) -> int:
         """Number of saved episodes."""
         return self._totals.episodes

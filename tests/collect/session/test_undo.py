@@ -1,10 +1,12 @@
 """Laws: after an undo all goes on from the last pause as if nothing had been since, and the data say so."""
 
+import av
 import numpy as np
 import pytest
 from collect_helpers import recording
 
 from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
@@ -44,9 +46,9 @@ UNDONE = [(FORTH, 10), (PAUSE, 30), (LEFT, 12), (UNDO, 1), (RIGHT, 8), (SUCCESS,
 PLAIN = [(FORTH, 10), (PAUSE, 30), (RIGHT, 8), (SUCCESS, 1)]
 
 
-def recorded(root, plan, plant, robot_fps=FPS):
+def recorded(root, plan, plant, robot_fps=FPS, **options):
     """Return the frames of an episode, and how it went."""
-    env = HandrailEnv(Reach(moving_obstacles=1), MODEL, fps=robot_fps, plant=plant)
+    env = HandrailEnv(Reach(moving_obstacles=1), MODEL, fps=robot_fps, plant=plant, **options)
     with recording(root, env) as recorder:
         periods = {"control_period": 1 / FPS, "record_period": 1 / FPS}
         outcome = Session(env, MaskedMpc(MODEL), Person(plan), [recorder], undoes=True, **periods).run(3)
@@ -66,6 +68,32 @@ def test_what_was_undone_never_was(tmp_path, plant, robot_fps):
         assert np.allclose(got, wanted, rtol=0, atol=1e-6), column
     assert set(frames["teleop.undos"]) == {0, 1}
     assert sorted(frames["teleop.undos"]) == list(frames["teleop.undos"])
+
+
+@pytest.mark.needs_gl
+def test_pictures_are_those_of_what_was_not_undone_and_wait_outside_of_memory(tmp_path, monkeypatch):
+    waiting = []
+    see = Recorder.see
+    monkeypatch.setattr(
+        Recorder, "see", lambda recorder, frame: (see(recorder, frame), waiting.append(recorder._undoable[:]))
+    )
+    options = {"cameras": ("front", "wrist"), "image_size": (48, 64)}
+    left = [(LEFT if what == RIGHT else what, count) for what, count in PLAIN]
+    for name, plan in (("undone", UNDONE), ("plain", PLAIN), ("left", left)):
+        recorded(tmp_path / name, plan, Simulation, **options)
+    kept = [frame for frames in waiting for frame in frames]
+    assert kept
+    assert not any(frame.images for frame in kept)
+    for camera in ("front", "wrist"):
+        undone, plain, other = (pictures(tmp_path / name, camera) for name in ("undone", "plain", "left"))
+        assert undone.shape == plain.shape
+        assert np.abs(undone - plain).sum() < 0.1 * np.abs(other - plain).sum()
+
+
+def pictures(root, camera):
+    (path,) = root.glob(f"videos/observation.images.{camera}/**/*.mp4")
+    with av.open(str(path)) as container:
+        return np.array([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)], float)
 
 
 def test_the_commands_replay_to_the_same_states(tmp_path):
