@@ -5,7 +5,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from handrail.collect.client_config import Port
+from handrail.collect.client_config import CLIENTS, Port
 from handrail.collect.flags import check_file, names, one_of
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -14,7 +14,7 @@ from handrail.controllers.typed import check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names
 
-_CAMERAS = ("front", "wrist")
+_CAMERAS = CLIENTS["lekiwi"]
 
 
 @dataclass(frozen=True)

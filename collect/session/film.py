@@ -33,15 +33,14 @@ class VideoFile:
         fps: pictures a second.
     """
 
-    def __init__(self, path: Path, size: tuple[int, int], fps: int | Fraction) -> None:
+    def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
         self._path, self._partial = path, beside(path, "partial")
         self._container = av.open(str(self._partial), "w", format="mp4")
-        rate = Fraction(fps)
         self._stream = self._container.add_stream(
-            "libx264", rate=rate, options={"crf": "20", "preset": "medium", "x264-params": "log=-1"}
+            "libx264", rate=fps, options={"crf": "20", "preset": "medium", "x264-params": "log=-1"}
         )
         self._stream.height, self._stream.width = size
-        self._tick = 1 / rate  # [s]; the muxer may choose another for the file
+        self._tick = Fraction(1, fps)  # [s]; the muxer may choose another for the file
         self._stream.pix_fmt, self._stream.time_base = "yuv420p", self._tick
         self._count = 0
 

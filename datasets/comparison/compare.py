@@ -103,9 +103,10 @@ def compare(config: CompareConfig) -> Comparison:
     for root in config.datasets:
         check_whole(root, config.verify)
     groups = load_groups(config.datasets, config.by, config.labels, config.columns)
-    baseline = baseline_of(groups, config.baseline)
+    labels = [group.label for group in groups]
+    baseline = baseline_of(labels, config.baseline)
     conditions = _conditions(config, groups)
-    pairs = pairs_between(list(conditions), baseline, [group.label for group in groups])
+    pairs = pairs_between(list(conditions), baseline, labels)
     rng = np.random.default_rng(config.seed)
     chosen = {ALL: groups, _SAME_NUMBER: matched_number(groups), _SAME_TIME: matched_time(groups)}
     counted = {title: _counted(title, each, config) for title, each in chosen.items()}

@@ -97,11 +97,6 @@ class Condition:
         return (SUCCESS, *sorted(set.intersection(*numbers) - {SUCCESS, "seed"}))
 
     @property
-    def amount(self) -> Mapping[str, float]:
-        """The data of the first policy."""
-        return self.policies[0].trained_on
-
-    @property
     def successes(self) -> int:
         """How many rollouts succeeded."""
         return sum(bool(rollout[SUCCESS]) for rollout in self.rollouts)
@@ -115,7 +110,7 @@ class Condition:
             "rollouts": len(self.rollouts),
             "seeds": [float(run.values.mean()) for run in self.runs()],
             "draws": len({policy.draw for policy in self.policies}),
-            "trained_on": self.amount,
+            "trained_on": self.policies[0].trained_on,
         }
 
     def runs(self, outcome: str = SUCCESS) -> list[Run]:

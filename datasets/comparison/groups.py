@@ -99,9 +99,8 @@ def load_groups(
     return groups
 
 
-def baseline_of(groups: Sequence[Group], name: str) -> str:
-    """Return the label of the group that the others are compared with: the first when `name` is ""."""
-    labels = [group.label for group in groups]
+def baseline_of(labels: Sequence[str], name: str) -> str:
+    """Return the label that the others are compared with: the first when `name` is ""."""
     if name and name not in labels:
         raise unknown_name("baseline", name, labels)
     return name or labels[0]

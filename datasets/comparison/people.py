@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from handrail.controllers.errors import unknown_name
 from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.groups import baseline_of
 from handrail.datasets.comparison.report import Report, contrast_table, values_table
 from handrail.datasets.comparison.scores import SCORES
 from handrail.datasets.comparison.user_study import (
@@ -95,9 +95,7 @@ def compare_people(config: CompareConfig) -> PeopleComparison:
     for root in (*study.datasets.values(), *scripted):
         check_whole(root, config.verify)
     trials, left_out = read_trials(study, scripted, config.columns)
-    if config.baseline and config.baseline not in study.conditions:
-        raise unknown_name("baseline", config.baseline, study.conditions)
-    baseline, rng = config.baseline or study.conditions[0], np.random.default_rng(config.seed)
+    baseline, rng = baseline_of(study.conditions, config.baseline), np.random.default_rng(config.seed)
     participants = tuple(sorted({trial.participant for trial in trials if trial.participant}))
     values: list[Value] = []
     contrasts: list[Contrast] = []

@@ -13,7 +13,7 @@ from typing import Any
 
 from handrail.datasets.format.metadata import Checksum
 from handrail.datasets.storage.atomic import write_whole
-from handrail.datasets.storage.strict_json import read_json
+from handrail.datasets.storage.strict_json import known_json
 
 
 class Checksums:
@@ -24,7 +24,7 @@ class Checksums:
         self._root = root
         name = hashlib.sha256(os.path.realpath(root).encode()).hexdigest()[:24]
         self._memory = memory_folder() / f"{name}.json"
-        self._known = {} if anew else self._remembered()
+        self._known = {} if anew else known_json(self._memory)
         self._used: dict[str, Any] = {}
 
     def of(self, path: Path) -> Checksum:
@@ -45,12 +45,6 @@ class Checksums:
         """Keep what was found for the next time; a full disk or a read-only home is no error."""
         with contextlib.suppress(OSError):
             write_whole(self._memory, json.dumps(self._used).encode())
-
-    def _remembered(self) -> dict[str, Any]:
-        with contextlib.suppress(OSError, ValueError):
-            content = read_json(self._memory)
-            return content if isinstance(content, dict) else {}
-        return {}
 
 
 def memory_folder() -> Path:

@@ -39,6 +39,15 @@ def load_json(path: Path, what: str) -> Any:
         raise HandrailError(f"{str(path)!r}: expected {what}, got {message_of(error)}") from error
 
 
+def known_json(path: Path) -> dict[str, Any]:
+    """Return the JSON object in a file; an empty one where there is none that can be read."""
+    try:
+        content = read_json(path)
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
 def write_json(path: Path, content: Any, indent: int | None = 1) -> None:
     """Write a file that `read_json` takes, whole or not at all; what is no finite number becomes null.
 

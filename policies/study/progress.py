@@ -9,8 +9,7 @@ from typing import Any
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.datasets.reading.reader import read_info
-from handrail.datasets.storage import strict_json
-from handrail.datasets.storage.strict_json import write_json
+from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import StudyJob, StudyLayout, jobs
@@ -79,7 +78,7 @@ class StudyProgress:
 
     @cached_property
     def _notes(self) -> dict[str, dict[str, Any]]:
-        return {job.name: note_of(job, self.layout) for job in self.jobs}
+        return {job.name: known_json(self.layout.done(job)) for job in self.jobs}
 
     @cached_property
     def jobs(self) -> list[StudyJob]:
@@ -87,25 +86,11 @@ class StudyProgress:
         return jobs(self.design)
 
 
-def note_of(job: StudyJob, layout: StudyLayout) -> dict[str, Any]:
-    """Return the note of a job that was done at some time: its settings, its result, what it took."""
-    return read_json(layout.done(job))
-
-
 def _has_rollouts(file: Path, config: EvaluateConfig) -> bool:
     """Return whether every seed was run under every condition."""
     conditions, wanted = read_evaluations([file]).values(), set(config.seeds)
     whole = [policy for each in conditions for policy in each.policies if wanted <= policy.rollouts.keys()]
     return len(conditions) == len(whole) == len(config.protections) * len(config.perturbations)
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return a JSON object; an empty one if there is none."""
-    try:
-        content = strict_json.read_json(path)
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def note_design(layout: StudyLayout, design: StudyDesign) -> None:
@@ -118,6 +103,6 @@ def note_design(layout: StudyLayout, design: StudyDesign) -> None:
 
 def designs(layout: StudyLayout) -> list[dict[str, str]]:
     """Return the designs that the folder was run with, the first one first: `digest`, `since`."""
-    found = read_json(layout.designs).get("designs", [])
+    found = known_json(layout.designs).get("designs", [])
     listed = found if isinstance(found, list) else []
     return [each for each in listed if isinstance(each, dict) and {"digest", "since"} <= each.keys()]

@@ -18,11 +18,10 @@ from handrail.datasets.reading.digest import digest_of_dataset
 from handrail.datasets.reading.load import recorded_episodes
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
-from handrail.datasets.storage.strict_json import write_json
+from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
-from handrail.policies.study.progress import note_of, read_json
 from handrail.policies.study.settings import evaluations, fingerprint, recording, training
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
@@ -74,7 +73,7 @@ def begin(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
     A dataset may grow, but never mix two ways to record; rollouts of other conditions go, and those of a
     policy that is gone; a policy that learnt otherwise goes with all its rollouts.
     """
-    settings, before = fingerprint(job, design), read_json(layout.begun(job))
+    settings, before = fingerprint(job, design), known_json(layout.begun(job))
     stale = [path for path in _stale(job, settings, before, layout) if path.exists()]
     if stale and "recording" not in before:
         raise HandrailError(
@@ -105,7 +104,7 @@ def work(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> dict[str, A
     """Do a job and return what is to be known of it when what is large is gone."""
     if job.policy:
         return _train_and_evaluate(job, job.policy, design, layout)
-    root, before = layout.dataset(job.cell), note_of(job, layout)
+    root, before = layout.dataset(job.cell), known_json(layout.done(job))
     collect(job.cell, design, root)
     found = summary(root, design.seed)
     same = before.get("settings") == fingerprint(job, design)

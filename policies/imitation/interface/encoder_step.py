@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -24,9 +24,21 @@ _TIME = "observation.time"
 Features = dict[PipelineFeatureType, dict[str, PolicyFeature]]
 
 
+class OwnStep(ProcessorStep):
+    """A step of our own, a dataclass whose fields make it again."""
+
+    def get_config(self) -> dict[str, Any]:
+        """Return what makes this step again."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]
+
+    def transform_features(self, features: Features) -> Features:
+        """Return the features as they are: LeRobot asks the steps of robots for theirs, never a policy's."""
+        return features
+
+
 @ProcessorStepRegistry.register(ENCODE)
 @dataclass(eq=False)
-class PolicyEncoderStep(ProcessorStep):
+class PolicyEncoderStep(OwnStep):
     """Reads from pictures where things are, as `observation.environment_state`, whatever is told of it."""
 
     reads: dict[str, Any]
@@ -56,9 +68,7 @@ class PolicyEncoderStep(ProcessorStep):
         rows = np.stack([memory.take(said, moment) for memory, moment in moments])
         around = torch.as_tensor(rows, device=device)
         shown[ENVIRONMENT] = around.reshape(*shown[STATE].shape[:-1], sizes[1])
-        changed: Any = transition.copy()
-        changed[TransitionKey.OBSERVATION] = shown
-        return changed
+        return changed(transition, TransitionKey.OBSERVATION, shown)
 
     def _forget(self, times: object) -> None:
         """Forget where an episode begins: where the time is not later."""
@@ -68,10 +78,6 @@ class PolicyEncoderStep(ProcessorStep):
                 if now <= then:
                     memory.forget()
 
-    def get_config(self) -> dict[str, Any]:
-        """Return what makes this step again."""
-        return {"reads": self.reads}
-
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return the encoder's weights."""
         return dict(self.encoder.network.state_dict())
@@ -80,14 +86,17 @@ class PolicyEncoderStep(ProcessorStep):
         """Take the encoder's weights."""
         self.encoder = Encoder.of(self.reads, state, f"step {ENCODE}")
 
-    def transform_features(self, features: Features) -> Features:
-        """Return the features as they are."""
-        return features
-
     def reset(self) -> None:
         """Forget what was seen."""
         self._memories: list[SceneMemory] = []
         self._times = np.zeros(0)
+
+
+def changed(transition: EnvTransition, key: TransitionKey, value: Any) -> EnvTransition:
+    """Return a transition with another observation or action."""
+    copied: Any = transition.copy()
+    copied[key] = value
+    return copied
 
 
 def encoder_step(encoder: Encoder) -> PolicyEncoderStep:

@@ -9,15 +9,14 @@ pictures
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
 import torch
-from lerobot.configs import PipelineFeatureType, PolicyFeature
 from lerobot.lerobot_types import EnvTransition, TransitionKey
-from lerobot.processor import ProcessorStep, ProcessorStepRegistry
+from lerobot.processor import ProcessorStepRegistry
 from lerobot.processor.normalize_processor import NormalizerProcessorStep
 
 from handrail.collect.operators.modes import MODES
@@ -35,7 +34,8 @@ from handrail.controllers.typed import Name, decoded
 from handrail.policies.imitation.interface.checkpoint import MIXED, Fps
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import (
-    PolicyEncoderStep,
+    OwnStep,
+    changed,
     encoder_step,
     numbers_of,
     shape_of,
@@ -45,7 +45,6 @@ from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, 
 from handrail.policies.imitation.interface.trust import ACT, COMPLETE, VIEW
 
 AROUND = tuple(f"observation.{name}" for name in ("time", "sent", "obstacles"))
-Features = dict[PipelineFeatureType, dict[str, PolicyFeature]]
 _views: "WeakValueDictionary[PolicyInterface, PolicyViewStep]" = WeakValueDictionary()
 """The step that sees, of the preprocessor loaded last: LeRobot loads those that act apart from it."""
 
@@ -112,7 +111,7 @@ class CompletedRobot:
 
 
 @dataclass(eq=False)
-class PolicyStep(ProcessorStep):
+class PolicyStep(OwnStep):
     """A step of our own."""
 
     interface: dict[str, Any]
@@ -121,14 +120,6 @@ class PolicyStep(ProcessorStep):
     def __post_init__(self) -> None:
         """Read the interface."""
         self.seen = decoded(self.interface, PolicyInterface, "policy interface")
-
-    def get_config(self) -> dict[str, Any]:
-        """Return what makes this step again."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
-
-    def transform_features(self, features: Features) -> Features:
-        """Return the features as they are: LeRobot asks the steps of robots for theirs, never a policy's."""
-        return features
 
 
 @ProcessorStepRegistry.register(VIEW)
@@ -163,9 +154,7 @@ class PolicyViewStep(PolicyStep):
             if values.shape[1]:
                 shown[key] = torch.as_tensor(values, device=device)
         self.raw, self.state = raw, state
-        changed: Any = transition.copy()
-        changed[TransitionKey.OBSERVATION] = shown
-        return changed
+        return changed(transition, TransitionKey.OBSERVATION, shown)
 
     def reset(self) -> None:
         """Forget what was seen."""
@@ -195,9 +184,7 @@ class PolicyActionStep(PolicyStep):
         rows = action.detach().cpu().numpy().reshape(-1, size)
         states = np.broadcast_to(self.view.state, (len(rows), self.view.state.shape[1]))
         acted = torch.as_tensor(np.stack(self._acted(rows, states, self.view.raw)))
-        changed: Any = transition.copy()
-        changed[TransitionKey.ACTION] = acted.reshape(*action.shape[:-1], acted.shape[1])
-        return changed
+        return changed(transition, TransitionKey.ACTION, acted.reshape(*action.shape[:-1], acted.shape[1]))
 
     def _acted(self, rows: FloatArray, states: FloatArray, raw: Mapping[str, Any]) -> list[FloatArray]:
         """Return actions, of what a policy writes, (B, a), in some states, (B, s)."""
@@ -282,5 +269,4 @@ def with_steps(
 
 def without_steps(pipeline: Any) -> Any:
     """Return a processor without our own steps, for who sees and acts through an interface itself."""
-    ours = PolicyStep, PolicyEncoderStep
-    return replace(pipeline, steps=[step for step in pipeline.steps if not isinstance(step, ours)])
+    return replace(pipeline, steps=[step for step in pipeline.steps if not isinstance(step, OwnStep)])

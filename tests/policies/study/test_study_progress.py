@@ -9,13 +9,13 @@ import pytest
 from study_helpers import COLLECTED, DESIGN, Starter, changed, everything, run_here
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.storage.strict_json import write_json
+from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.training import presets
 from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import Flat
 from handrail.policies.study.jobs import jobs
-from handrail.policies.study.progress import StudyProgress, read_json
+from handrail.policies.study.progress import StudyProgress
 from handrail.policies.study.settings import evaluations, fingerprint, load_design, recording
 from handrail.policies.study.work import begin, do, work
 
@@ -104,11 +104,11 @@ EE = "evaluations/reach/ee/0/{}/realised-time.json"
 
 
 def edit(path, key, value):
-    write_json(path, read_json(path) | {key: value})
+    write_json(path, known_json(path) | {key: value})
 
 
 def drop_rollout(path):
-    content = read_json(path)
+    content = known_json(path)
     content["arms"]["ee pushed"][0]["rollouts"].pop()
     write_json(path, content)
 
