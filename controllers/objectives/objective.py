@@ -1,7 +1,7 @@
 """What an objective is: a residual of one stage, written once as a CasADi expression."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
@@ -39,3 +39,25 @@ class Objective:
     weights: Callable[[BoolArray], FloatArray]  # mask of the commanded channels (m,) → w, (rows,)
     parameters: FloatArray = field(default_factory=lambda: np.zeros(0))
     """P at the beginning, (k,); may be changed at every update."""
+
+
+def switchable(objective: Objective, on: bool = False) -> Objective:
+    """Return the objective with one more parameter, the last: `s (r - reference)`, 1 on, 0 off.
+
+    Anything between scales the weight by its square: an objective that fades in.
+    """
+
+    def residual(stage: Stage, p: ca.SX) -> ca.SX:
+        return p[-1] * (objective.residual(stage, p[:-1]) - objective.reference)
+
+    return replace(
+        objective,
+        residual=residual,
+        reference=np.zeros_like(objective.reference),
+        parameters=switched(objective.parameters, on),
+    )
+
+
+def switched(parameters: FloatArray, on: bool = True) -> FloatArray:
+    """Return the parameters of a switchable objective."""
+    return np.append(parameters, float(on))

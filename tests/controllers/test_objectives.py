@@ -9,8 +9,7 @@ from ideal_robot import CHANNELS, HOME, MODEL, PERIOD, intent, realised, roll
 
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.hold import end_effector_hold, hold_parameters
-from handrail.controllers.objectives.objective import Stage
-from handrail.controllers.objectives.switch import switchable, switched
+from handrail.controllers.objectives.objective import Stage, switchable, switched
 from handrail.controllers.objectives.tray import GRAVITY, acceleration, tray_levelling
 from handrail.controllers.ocp.settings import MpcSettings
 

@@ -26,7 +26,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Extrapolated
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.hold import end_effector_hold, hold_parameters
-from handrail.controllers.objectives.switch import switchable, switched
+from handrail.controllers.objectives.objective import switchable, switched
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import Pose, RobotModel, load_model
 from handrail.controllers.typed import check_settings

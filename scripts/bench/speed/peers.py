@@ -232,4 +232,4 @@ def _piqp(loop: TimingLoop) -> Take:
 PEERS: dict[str, Callable[[TimingLoop], Take]] = {
     each.__name__.strip("_"): each for each in (_ipopt, _mink, _pink, _own_qp, _daqp, _piqp)
 }
-"""The solvers by name, as `speed.config.PEERS` lists them."""
+"""The solvers by name."""

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.scripts.bench.operators.file import TrialsConfig, trials_file
-from handrail.scripts.bench.operators.trials import run_trials
+from handrail.scripts.bench.operators.trials import TrialsConfig, run_trials, trials_file
 
 
 @pytest.fixture(scope="module")
