@@ -79,6 +79,7 @@ class Slide(FrozenArrays):
     travel: float  # from closed to open [m]
     damping: float = 8.0  # force per speed [N s/m]
     friction: float = 3.0  # force that it takes to move it [N]
+    closing: float = 0.0  # force that closes it by itself [N]; 0: it stays where it is left
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,8 @@ def _add_freedom(body: MjsBody, item: SceneObject) -> None:
             range=[0.0, item.slide.travel],
             damping=[item.slide.damping, 0.0, 0.0],
             frictionloss=item.slide.friction,
+            stiffness=[float(item.slide.closing > 0.0), 0.0, 0.0],
+            springref=-item.slide.closing,  # far beyond the stop: the force hardly changes on the way
         )
     if not item.parts:
         geometry.set_box_inertia(body, item.mass, geometry.bounding_box(item.shape))

@@ -168,7 +168,10 @@ class StickMap(InputMap):
             tools = [self._model.pose(q, hand.named("tool")) for hand in self._model.description.hands]
             pairs = zip(tools, target.of_hands(tools), strict=True)
             return dict(enumerate(hand_twist(tool, place, self._gains, target.pace) for tool, place in pairs))
-        return {self._model.number: goal.hand}
+        going = self._model.number
+        if target is not None and target.second is not None:
+            return {going ^ target.second: goal.hand, 1 - (going ^ target.second): np.zeros(6)}
+        return {going: goal.hand}
 
     def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return what the expert makes of a goal on all joints, (n,), within full stick."""

@@ -1,6 +1,7 @@
 """A script made of phases: go there, with the hand or the base, then the next; routes among tables."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,7 +34,8 @@ class ScriptPhase(Target):
 
     name: str = ""  # what it is, for whoever plans anew after it
     focus: Focus = "hand"  # which of the two ends the phase, and is steered in switching mode
-    gripper: float = 0.0  # 0 open, 1 closed
+    gripper: float = 0.0  # 0 open, 1 closed; of a pair, of the hand that begins the task
+    other: float | None = None  # the other hand's; None: open, and of a pair the same
     beside: float = 0.0  # `distance` across the tool's axis, where more is good enough there [m]
     dwell: float = 0.0  # time to wait, hands still, before the next phase [s]
     patience: float = np.inf  # time after which the operator goes on anyway [s]
@@ -91,8 +93,10 @@ class PhasedScript(ABC):
     def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now, and go to the next phase when this one is done."""
         self._advance(view)
-        phase, hands = self._phases[0], len(self._model.description.hands)
-        grippers = (phase.gripper,) * (hands if phase.apart else 0)
+        phase, hands = self._phases[0], range(len(self._model.description.hands))
+        going, other = self._model.number ^ bool(phase.second), phase.other
+        other = phase.gripper * bool(phase.apart) if other is None else other
+        grippers = tuple(phase.gripper if hand == going else other for hand in hands)
         if self._reached_at is not None:
             return replace(MotionGoal.rest(phase.focus, phase.gripper), grippers=grippers)
         hand = hand_twist(phase.steered(view.task), phase.hand, self._gains, phase.pace)
@@ -117,6 +121,11 @@ class PhasedScript(ABC):
 def from_phase(phases: list[ScriptPhase], name: str) -> list[ScriptPhase]:
     """Return the phases from the one of a name on."""
     return phases[[phase.name for phase in phases].index(name) :]
+
+
+def turns(second: bool, other: float, phases: Iterable[ScriptPhase]) -> list[ScriptPhase]:
+    """Return phases of one hand while the other holds still, its gripper closed or open."""
+    return [replace(phase, second=second, other=other) for phase in phases]
 
 
 class Route:

@@ -74,22 +74,23 @@ class PickPlaceScript(PhasedScript):
                 carry("front", edges[1] - _RETREAT * scale, place[1], stands[1]),
             ]
         rim = _above(place, task.object("bin").top - place[2])
-        room = self._room(float(task.object("cube").shape.size[0]))
-        return [*begin, *self._pick(pick, down, stands[0], room), *way, *self._place(rim, down, stands[1])]
+        taking = self._pick(view, pick, down, stands[0])
+        return [*begin, *taking, *way, *self._place(rim, down, stands[1])]
 
-    def _room(self, width: float) -> float:
+    def _room(self, view: View) -> float:
         """Return how far beside the cube the hand may be for the open fingers to close around it [m].
 
         `(stroke − w (cos a + sin a)) / 2` for a cube of width w that is turned by a; as much either way.
         """
         gripper, near = self._model.hand.gripper, _NEAR * self._grip
+        width = float(view.task.object("cube").shape.size[0])
         turned = width * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
         return near if gripper is None else max(near, (gripper.stroke - turned) / 2)
 
-    def _pick(self, cube: FloatArray, down: FloatArray, base: FloatArray, room: float) -> list[ScriptPhase]:
+    def _pick(self, view: View, cube: FloatArray, down: FloatArray, base: FloatArray) -> list[ScriptPhase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
         grip, at = self._grip, partial(ScriptPhase.at, rotation=down, base=base)
-        grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
+        room, grasp = self._room(view), _above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
         return [
             at("above", _above(cube, 0.14 * grip), distance=0.02 * grip, angle=0.10),
             at("descend", grasp, distance=_NEAR * grip, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),

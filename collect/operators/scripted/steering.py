@@ -31,12 +31,15 @@ class Target:
     apart: float = 0.0
     """Between two hands that are steered as a pair, along their common y [m], where the pose is half-way; 0:
     one is steered."""
+    second: bool | None = None
+    """Of two hands that take turns: whether it is where the hand goes that does not begin the task; the other
+    one holds still. None: the other one is not minded."""
     meant: Pose | None = None
     """The pose itself where `hand` is as somebody sees it, who misjudges; None where it is the same."""
 
     def steered(self, task: TaskState) -> Pose:
         """Return where what is steered is now: a hand's tool, or what is half-way between two."""
-        return task.pair if self.apart else task.tool
+        return task.pair if self.apart else task.tools[task.hand ^ bool(self.second)]
 
     def of_hands(self, tools: Sequence[Pose]) -> list[Pose]:
         """Return where the hands of a pair belong, on the sides where their tools are now."""

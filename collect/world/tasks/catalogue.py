@@ -43,6 +43,8 @@ TASKS = Registry(
     (
         _spec("carry_box", "CarryBox", "carry a box with both hands", hands=2),
         _spec("drawer", "Drawer", "pull it open"),
+        _spec("fetch", "Fetch", "hold the drawer open and take the cube out", hands=2),
+        _spec("hand_over", "HandOver", "pass a bar from hand to hand into a bin", hands=2),
         _spec("pick_place", "PickPlace", "carry a cube into a bin"),
         _spec("reach", "Reach", "bring the hand to a pose", movers=True),
         _spec("tray", "Tray", "carry a tray with a can on it", objectives=f"{_TRAY}:level_tray", **_LEVEL),

@@ -25,6 +25,8 @@ _DEPTH, _WIDTH, _WALL = 0.45, 0.50, 0.02  # of the cabinet [m]
 _TALL, _GAP = 0.20, 0.006  # of the drawer's opening, and the play around the drawer [m]
 _BAR, _LENGTH, _STANDOFF = 0.018, 0.16, 0.055  # of the handle, and from the front to its centre [m]
 _MASS = 2.5  # of the drawer [kg]
+_THIN = 0.012  # its bottom and sides [m]
+FLOOR = _THIN + _GAP - _TALL / 2  # of the drawer, in its frame [m]
 TRAVEL = 0.35  # of the drawer [m]
 DROP = _WALL + _TALL / 2  # of the drawer's middle below the cabinet's top [m]
 HANDLE = np.array([-_DEPTH / 2 - _STANDOFF, 0.0, 0.0])  # in the drawer's frame, closed [m]
@@ -49,7 +51,7 @@ def drawer(name: str, body: SceneObject) -> SceneObject:
     """Return the drawer of a cabinet, closed; it opens along −x of its frame."""
     width, tall = _WIDTH - 2 * _WALL - 2 * _GAP, _TALL - 2 * _GAP
     depth, deep = _DEPTH - _WALL - _GAP, 0.6 * tall
-    front, thin = -_DEPTH / 2, 0.012
+    front, thin = -_DEPTH / 2, _THIN
     middle, low = front + depth / 2, (deep - tall) / 2
     parts = [
         block((_WALL, width, tall), [front + _WALL / 2, 0.0, 0.0]),

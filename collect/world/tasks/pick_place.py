@@ -29,6 +29,7 @@ from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.parts import WorldScale
 
 _MASS = 0.1  # of a cube of 5 cm [kg]
+_SLIM = 0.7  # width of a bar, which two hands have to find, over a cube's
 _BIN_HEIGHT = 0.10
 _AT, _AROUND, _LIFTED = (
     2.0,
@@ -52,6 +53,8 @@ class PickPlace(Task):
     horizon: float = 90.0  # time limit [s]
     clearance: float = 0.15
     """Between the robot's start and anything on the floor, and between obstacles, at scale 1 [m]."""
+    length: float = 0.0
+    """Of the cube along its y, where it is a bar; the bin is larger by half of that [m]."""
     stages = ("approach", "grasp", "lift", "carry", "place")
 
     @property
@@ -65,7 +68,10 @@ class PickPlace(Task):
         side, world = rng.choice([-1.0, 1.0]), model.description.world
         tables = _sample_table("cube_table", side, world, rng), _sample_table("bin_table", -side, world, rng)
         q = near_home(model, rng)
-        things = _sample_cube(tables[0], world, rng), _sample_bin(tables[1], world, rng)
+        things = (
+            _sample_cube(tables[0], world, rng, self.length),
+            _sample_bin(tables[1], world, rng, self.length),
+        )
         objects = (*tables, *things, *sample_obstacles(model, q, rng, self.clearance))
         return Start(Scene(objects, _VIEW.scaled(world.scale)), q)
 
@@ -106,9 +112,15 @@ class PickPlace(Task):
         return Verdict(success=rests and state.let_go(position))
 
 
-def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
-    """Return the rotation nearest to the tool's that points it down, fingers square to the cube, (3, 3)."""
-    angles = np.arctan2(cube[1, 0], cube[0, 0]) + np.pi / 2 * np.arange(4)
+def grasp_rotation(tool: FloatArray, cube: FloatArray, turns: int = 4) -> FloatArray:
+    """Return the rotation nearest to the tool's that points it down, fingers square to the cube, (3, 3).
+
+    Args:
+        tool: world from tool, (3, 3).
+        cube: world from cube, (3, 3).
+        turns: 2 where the fingers close along its x alone.
+    """
+    angles = np.arctan2(cube[1, 0], cube[0, 0]) + 2 * np.pi / turns * np.arange(turns)
     ahead = ([np.cos(angle), np.sin(angle), 0.0] for angle in angles)
     return nearest_rotation(tool, (hand_rotation(x, [0.0, 0.0, -1.0]) for x in ahead))
 
@@ -119,16 +131,17 @@ def _sample_table(name: str, side: float, world: WorldScale, rng: np.random.Gene
     return table(name, scale * x, scale * y, (scale * 0.6, scale * 0.7, rng.uniform(*world.tables)), scale)
 
 
-def _sample_cube(on: SceneObject, world: WorldScale, rng: np.random.Generator) -> SceneObject:
+def _sample_cube(on: SceneObject, world: WorldScale, rng: np.random.Generator, length: float) -> SceneObject:
     x = on.front + world.scale * rng.uniform(0.10, 0.20)
     y = on.position[1] + world.scale * rng.uniform(-0.15, 0.15)
     yaw = rng.uniform(-np.pi / 4, np.pi / 4)  # a cube looks the same every quarter turn
-    return cube("cube", x, y, on.top, yaw, world.cube, _MASS * world.grip**3)
+    edge = _SLIM * world.cube if length else world.cube
+    return cube("cube", x, y, on.top, yaw, edge, _MASS * world.grip**3, length)
 
 
-def _sample_bin(on: SceneObject, world: WorldScale, rng: np.random.Generator) -> SceneObject:
+def _sample_bin(on: SceneObject, world: WorldScale, rng: np.random.Generator, length: float) -> SceneObject:
     scale = world.scale
-    inner = scale * rng.uniform(0.24, 0.28)
+    inner = scale * rng.uniform(0.24, 0.28) + length / 2
     x = on.front + inner / 2 + scale * rng.uniform(0.04, 0.10)
     y = on.position[1] + scale * rng.uniform(-0.12, 0.12)
     return open_bin("bin", x, y, on.top, inner, scale * _BIN_HEIGHT, scale)
