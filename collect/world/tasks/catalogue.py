@@ -47,6 +47,7 @@ TASKS = Registry(
         _spec("hand_over", "HandOver", "pass a bar from hand to hand into a bin", hands=2),
         _spec("pick_place", "PickPlace", "carry a cube into a bin"),
         _spec("reach", "Reach", "bring the hand to a pose", movers=True),
+        _spec("reach_both", "ReachBoth", "bring each hand to a pose of its own", hands=2),
         _spec("tray", "Tray", "carry a tray with a can on it", objectives=f"{_TRAY}:level_tray", **_LEVEL),
         TaskSpec(
             "wide_tray",

@@ -37,7 +37,7 @@ _MOST_TRIES = 200
 _POSTURES = 30
 _REACHED = 1e-3  # error of the hand's pose that is left [m, rad]
 _CLEAR = 0.12  # kept to itself and to the floor there, at scale 1 [m]
-_VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
+VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
 
 FASTEST = 0.5  # [m/s]
 _SLOWEST = 0.2  # [m/s]
@@ -150,7 +150,7 @@ class Reach(Task):
         """Draw a goal, then the moving obstacles."""
         goal, scale = sample_goal_for(model, rng), model.description.world.scale
         movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
-        scene = Scene((goal_marker(goal, scale), *movers), _VIEW.scaled(scale))
+        scene = Scene((goal_marker(goal, scale), *movers), VIEW.scaled(scale))
         return Start(scene, model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
