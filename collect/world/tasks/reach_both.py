@@ -49,11 +49,11 @@ class ReachBoth(Reach):
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge both hands."""
-        one, other = (Reach.outcome(self, each) for each in (state, of_other(state)))
+        one, other = (Reach.outcome(self, each) for each in (state, _of_other(state)))
         return Verdict(one.success and other.success)
 
 
-def of_other(state: TaskState) -> TaskState:
+def _of_other(state: TaskState) -> TaskState:
     """Return the moment as it is for the other hand, which has a goal of its own."""
     return replace(state, hand=1 - state.hand, start=replace(state.start, goal=state.pose(OTHER)))
 
