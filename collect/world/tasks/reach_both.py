@@ -23,8 +23,8 @@ OTHER = "other_goal"  # of the hand that does not begin
 class ReachBoth(Reach):
     """Goals are where both hands are in a random posture; `Reach` says how near is enough; start at home.
 
-    The posture keeps clear of itself. Its base is in x, y ∈ [−1, 1] m · scale, its joints at most 1 m or 1 rad
-    from home, its hands as high as goals of `Reach`. Success: both hands are at their goals at once.
+    The posture keeps clear of itself. Its base is in x, y ∈ [−1, 1] m · scale, its joints are at most 1 m or
+    1 rad from home, its hands as high as goals of `Reach`. Success: both hands are at their goals at once.
     """
 
     description: str = "Move each gripper to its own goal frame."
@@ -73,6 +73,6 @@ def _sample_goals(model: RobotModel, rng: np.random.Generator) -> list[Pose]:
         if level and bool(np.all(collision.values(q[None])[0] >= clear)):
             return goals
     raise HandrailError(
-        f"task ReachBoth: expected a robot that lifts both hands {world.goals[0]} to {world.goals[1]} m high, "
+        f"task ReachBoth: expected a robot with both hands {world.goals[0]} to {world.goals[1]} m high, "
         f"clear of itself, got {description.name}, which did in none of {_MOST_TRIES} postures"
     )
