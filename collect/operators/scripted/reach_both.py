@@ -1,5 +1,7 @@
 """How an operator brings two hands to a pose each: one after the other."""
 
+from functools import partial
+
 import numpy as np
 
 from handrail.collect.operators.operator import View
@@ -19,14 +21,9 @@ class ReachBothScript(PhasedScript):
     def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way of one hand, then of the other; the base stands before the middle of both goals."""
         task, goal, other = view.task, view.task.goal or view.tool, view.task.pose(OTHER)
-        sides = (goal, other) if task.hand == 0 else (other, goal)
-        x, y, _ = sides[0].position - sides[1].position
+        x, y, _ = (goal.position - other.position) * (1 if task.hand == 0 else -1)
         yaw = float(np.arctan2(-x, y))
-        middle = (goal.position + other.position)[:2] / 2
-        place = middle - _AHEAD * self._scale * np.array([np.cos(yaw), np.sin(yaw)])
-        near = {"distance": 0.05 * self._scale, "angle": 0.2, "patience": 20.0}
-        one = ScriptPhase(goal, np.array([*place, yaw]), name="one", **near)
-        return [
-            *turns(False, 0.0, [one]),
-            *turns(True, 0.0, [ScriptPhase(other, one.base, name="other", **near)]),
-        ]
+        ahead = _AHEAD * self._scale * np.array([np.cos(yaw), np.sin(yaw)])
+        base = np.array([*((goal.position + other.position)[:2] / 2 - ahead), yaw])
+        near = partial(ScriptPhase, base=base, distance=0.05 * self._scale, angle=0.2, patience=20.0)
+        return [*turns(False, 0.0, [near(goal, name="one")]), *turns(True, 0.0, [near(other, name="other")])]
