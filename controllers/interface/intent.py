@@ -72,6 +72,11 @@ class Intent:
         return replace(self, grippers=(same,) * hands)
 
     @property
+    def newest(self) -> float:
+        """When the last of those that ask did so [s]."""
+        return self.time
+
+    @property
     def is_finite(self) -> bool:
         """Whether every commanded value, grippers and the time are numbers, and each value has a mask."""
         scalars = all(map(math.isfinite, (*self.grippers, self.time)))

@@ -71,4 +71,4 @@ class InputValidator:
             return False
         if len(intent.grippers) not in (1, len(self.channels.hands)):
             return False
-        return intent.is_finite and intent.frames.are_known and intent.time <= state.time + _LEAD
+        return intent.is_finite and intent.frames.are_known and intent.newest <= state.time + _LEAD

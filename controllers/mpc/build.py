@@ -9,6 +9,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.sources import Intents
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.regularisation import (
@@ -32,6 +33,9 @@ class ProblemBuilder:
         model: of the robot.
         settings: weights, margins, horizon.
         residuals: of all objectives.
+
+    Attributes:
+        largest: what a command of each channel is cut to, (m,).
     """
 
     def __init__(self, model: RobotModel, settings: MpcSettings, residuals: StageResiduals) -> None:
@@ -44,8 +48,8 @@ class ProblemBuilder:
         base, hands = len(self._channels.base), self._channels.names[self._channels.hands_slice]
         fastest = np.where(_lengths(model, self._channels), settings.largest_speed, settings.largest_rate)
         velocity, fastest = self._limits.velocity, fastest[base : base + len(hands)]
-        # what a command of each channel is cut to, (m,): nothing faster is possible, or wise
-        self._largest = np.concatenate([velocity[:base], fastest, velocity])
+        # nothing faster is possible, or wise
+        self.largest = np.concatenate([velocity[:base], fastest, velocity])
         self._home, start = model.description.home, self._channels.size + 2 * model.size
         self._posture = slice(start, start + model.size)
         self._weights_of = lru_cache(_MASKS)(self._weights)
@@ -58,10 +62,14 @@ class ProblemBuilder:
         expected = len(self._times), self._channels.size
         if predicted.shape != expected:
             raise HandrailError(f"prediction: expected values of shape {expected}, got {predicted.shape}")
-        reference = _asked(self._reference, predicted, intent.mask, self._largest)
+        reference = _asked(self._reference, predicted, intent.mask, self.largest)
         parameters[self._residuals.parameter_slice("tracking")] = intent.frames.parameters
         if loop.rest is not None:
             reference[:, self._posture] = np.where(np.isnan(loop.rest), self._home, loop.rest)
+        weights = self._weights_of(intent.mask.tobytes())
+        if isinstance(intent, Intents):
+            weights = weights.copy()
+            weights[:, : self._channels.size] *= intent.share
         sent = state.sent(self._limits)
         return Problem(
             q=state.expected,
@@ -69,7 +77,7 @@ class ProblemBuilder:
             sent=sent,
             dt=settings.dt,
             reference=reference,
-            weights=self._weights_of(intent.mask.tobytes()),
+            weights=weights,
             parameters=parameters,
             limits=self._limits,
             collision=loop.surroundings.collision,

@@ -11,6 +11,7 @@ from handrail.controllers.interface.command import Command, Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Prediction, constant
+from handrail.controllers.interface.sources import OfSources
 from handrail.controllers.interface.validation import InputValidator
 from handrail.controllers.mpc.build import ProblemBuilder, built_in_objectives
 from handrail.controllers.mpc.loop_state import LoopState
@@ -38,7 +39,7 @@ class MaskedMpc:
         model: of the robot.
         settings: weights, margins, horizon; made to the measure of the robot's world by default.
         objectives: autonomous objectives besides the built-in ones.
-        predict: intent prediction Ψ.
+        predict: intent prediction Ψ of every source that brings none of its own.
 
     Attributes:
         channels: the robot's command channels.
@@ -62,7 +63,7 @@ class MaskedMpc:
         self._builder = ProblemBuilder(model, self.settings, self.residuals)
         self._validator = InputValidator(self.channels, self.settings.intent_timeout)
         self._supervisor = Supervisor(Limiter(model.description), self.settings, len(self.channels.hands))
-        self._predict = predict
+        self._predict = OfSources(predict, self._builder.largest)
         self.reset()
 
     @property
