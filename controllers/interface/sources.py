@@ -25,6 +25,11 @@ class Source:
         """Return its weight on each channel, 0 where it owns none, (m,)."""
         return np.where(self.intent.mask, self.weight, 0.0)
 
+    @property
+    def is_active(self) -> bool:
+        """Whether it has a weight on some channel that it owns."""
+        return bool(np.any(self.intent.mask & (np.asarray(self.weight) != 0.0)))
+
 
 @dataclass(frozen=True)
 class Intents(Intent):
@@ -37,6 +42,7 @@ class Intents(Intent):
 
     sources: tuple[Source, ...] = ()
     share: FloatArray = field(default_factory=lambda: np.ones(0))  # W, (m,)
+    of_grippers: tuple[str, ...] = ()  # name of the source that owns each gripper
 
     @classmethod
     def of(cls, sources: Sequence[Source], grippers: tuple[float, ...], base: Intent) -> "Intents":
@@ -51,9 +57,9 @@ class Intents(Intent):
             base: whose mode, frames and raw input it has; and its time, where no source owns a channel.
         """
         size = len(base.values)
-        owners = [source for source in sources if np.any(source.intent.mask)]
+        owners = [source for source in sources if np.any(source.intent.mask) and np.any(source.weight)]
         usable = all(_fits(source, base) for source in owners)
-        active = tuple(source for source in owners if source.share().any()) if usable else ()
+        active = tuple(source for source in owners if source.is_active) if usable else ()
         shares = [source.share() for source in active]
         total = np.sum([np.zeros(size), *shares], axis=0) if usable else np.ones(size)
         values = merged([source.intent.values for source in active], shares, size)
@@ -65,14 +71,23 @@ class Intents(Intent):
             time=min((source.intent.time for source in active), default=base.time),
             frames=base.frames,
             raw=base.raw,
-            sources=active,
+            sources=tuple(sources) if usable else (),
             share=frozen(total),
         )
 
     @property
+    def active(self) -> tuple[Source, ...]:
+        """The sources that own something, with some weight."""
+        return tuple(source for source in self.sources if source.is_active)
+
+    @property
     def newest(self) -> float:
-        """When the last of the sources asked [s]."""
-        return max((source.intent.time for source in self.sources), default=self.time)
+        """When the last of these asked [s]."""
+        return max((source.intent.time for source in self.active), default=self.time)
+
+    def source(self, name: str) -> Source | None:
+        """Return a source by its name, if it is there."""
+        return next((source for source in self.sources if source.name == name), None)
 
 
 def _fits(source: Source, base: Intent) -> bool:
@@ -122,7 +137,7 @@ class OfSources:
         fresh, known = self.first or self.predict, dict(self.own)
         own = {
             each.name: after(each.predict or known.get(each.name, fresh), each.intent)
-            for each in intent.sources
+            for each in intent.active
         }
         return replace(self, first=fresh, own=tuple((known | own).items()))
 
@@ -133,9 +148,9 @@ class OfSources:
         own, cut = dict(self.own), self.largest
         values = [
             np.clip((each.predict or own.get(each.name, self.predict))(each.intent, times), -cut, cut)
-            for each in intent.sources
+            for each in intent.active
         ]
-        shares = [each.share() for each in intent.sources]
+        shares = [each.share() for each in intent.active]
         return merged(values, shares, len(cut)) if values else constant(intent, times)
 
 

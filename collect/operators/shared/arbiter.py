@@ -1,0 +1,133 @@
+"""An arbiter says how much a person and a policy each weigh on every channel now."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+
+PERSON, POLICY = "person", "policy"  # names of the sources
+_MOVED = 1e-3  # of a commanded velocity: less is a hand that rests on its stick [m/s, rad/s]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a person and a policy want in this moment."""
+
+    time: float  # of the robot's clock [s]
+    person: Intent  # in the usual frames
+    policy: Intent | None  # the same; None where the policy has no usable answer
+    realised: FloatArray  # the velocity of every channel as it is, (m,)
+    doubt: float = 0.0  # how unsure the policy says it is; 0 of one that does not say
+
+
+class Shares(NamedTuple):
+    """The weights of both on every channel, (m,) each; where a source owns nothing they mean nothing."""
+
+    person: FloatArray
+    policy: FloatArray
+
+
+class Arbiter(Protocol):
+    """Decides who owns what now."""
+
+    def reset(self) -> None:
+        """Begin an episode."""
+
+    def shares(self, wishes: Wishes) -> Shares:
+        """Return how much each weighs."""
+        ...
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Channels that a person takes together: the base, a hand, the pair, each joint by itself.
+
+    Args:
+        channels: of the robot.
+    """
+
+    channels: Channels
+
+    @cached_property
+    def masks(self) -> dict[str, BoolArray]:
+        """Each group's channels, (m,), by its name."""
+        channels, first = self.channels, len(self.channels.base)
+        named = {"base": channels.mask("base")} if first else {}
+        named |= {self.hand(n): _sliced(channels, channels.hand_slice(n)) for n in range(len(channels.hands))}
+        named |= {"pair": channels.mask("pair", "apart")} if channels.pair else {}
+        return named | {name: channels.mask(name) for name in channels.joints}
+
+    def hand(self, number: int) -> str:
+        """Return the name of a hand's group."""
+        return self.channels.hands[number][0].split(".")[0]
+
+    def moved(self, intent: Intent) -> BoolArray:
+        """Return the channels of an intent's groups in which something is moved, (m,)."""
+        still = bool(intent.raw.device) and not intent.raw.axes
+        moves = intent.mask & (np.abs(np.nan_to_num(intent.values, nan=1.0)) > _MOVED)
+        moves &= not still
+        found = [mask for mask in self.masks.values() if np.any(moves & mask)]
+        return intent.mask & np.any([np.zeros_like(moves), *found], axis=0)
+
+    def taken(self, owned: BoolArray) -> BoolArray:
+        """Return the channels that others lose to an owner of some, (m,): those and what contradicts them.
+
+        The base's twist and its joints are the same motion. With a hand go the pair, and the joints of its
+        arm alone; with all of these joints goes the hand. What moves a hand from afar (base, torso) stays:
+        the MPC lets the arm make up for it.
+        """
+        lost, arms = owned.copy(), [self._arm(hand) for hand in range(len(self.channels.hands))]
+        base = self.channels.mask("base") if self.channels.base else np.zeros_like(owned)
+        joints = np.zeros_like(owned)
+        joints[self.channels.joint_slice.start :][: len(self.channels.base)] = True
+        if np.any(owned & (base | joints)):
+            lost |= base | joints
+        pair = self.masks.get("pair", np.zeros_like(owned))
+        for hand, arm in enumerate(arms):
+            twist = self.masks[self.hand(hand)]
+            if np.any(owned & (twist | pair)) or np.all(owned[arm]):
+                lost |= twist | arm | pair
+        return lost
+
+    def grippers(self, owned: BoolArray) -> tuple[bool, ...]:
+        """Return of which grippers an owner of channels has the hand, its pair, or a joint of its arm."""
+        pair = self.masks.get("pair", np.zeros_like(owned))
+        arms = (self.masks[self.hand(n)] | self._arm(n) | pair for n in range(len(self.channels.hands)))
+        return tuple(bool(np.any(owned & arm)) for arm in arms)
+
+    def _arm(self, hand: int) -> BoolArray:
+        alone = len(self.channels.hands) == 1
+        return self.channels.mask("arm" if alone else f"{self.hand(hand)}.arm")
+
+
+def _sliced(channels: Channels, where: slice) -> BoolArray:
+    mask = np.zeros(channels.size, dtype=bool)
+    mask[where] = True
+    return mask
+
+
+class Lately:
+    """Remembers what a person moved lately: it stays theirs for a moment, so that a pause is no hand-back.
+
+    Args:
+        groups: of the robot's channels.
+        handback: how long after it was moved last [s].
+    """
+
+    def __init__(self, groups: Groups, handback: float) -> None:
+        self._groups, self._handback = groups, handback
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin an episode: nothing is the person's."""
+        self._until = np.full(self._groups.channels.size, -np.inf)
+
+    def owned(self, wishes: Wishes) -> BoolArray:
+        """Return the channels that are the person's now, (m,)."""
+        self._until[self._groups.moved(wishes.person)] = wishes.time + self._handback
+        return wishes.person.mask & (self._until > wishes.time)

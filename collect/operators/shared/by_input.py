@@ -1,0 +1,81 @@
+"""Arbiters that go by what the person moves: by mask, wholly, or blended."""
+
+import numpy as np
+
+from handrail.collect.operators.shared.arbiter import Groups, Lately, Shares, Wishes
+from handrail.controllers.errors import HandrailError
+
+HANDBACK = 0.5  # after which what was moved last goes back to the policy [s]
+
+
+class ByMask:
+    """What a person moves is theirs, the policy keeps the rest; let go, it is handed back after a moment.
+
+    Args:
+        groups: of the robot's channels.
+        handback: how long after a group was moved last [s].
+    """
+
+    def __init__(self, groups: Groups, handback: float = HANDBACK) -> None:
+        self._groups, self._lately = groups, Lately(groups, handback)
+
+    def reset(self) -> None:
+        """Begin an episode."""
+        self._lately.reset()
+
+    def shares(self, wishes: Wishes) -> Shares:
+        """Return 1 where a source is the owner, 0 elsewhere."""
+        owned = self._lately.owned(wishes)
+        return Shares(owned.astype(float), (~self._groups.taken(owned)).astype(float))
+
+
+class Whole:
+    """Any input takes everything, as long as something is moved and a moment more.
+
+    Args:
+        groups: of the robot's channels.
+        handback: how long after the last input [s].
+    """
+
+    def __init__(self, groups: Groups, handback: float = HANDBACK) -> None:
+        self._groups, self._lately = groups, Lately(groups, handback)
+
+    def reset(self) -> None:
+        """Begin an episode."""
+        self._lately.reset()
+
+    def shares(self, wishes: Wishes) -> Shares:
+        """Return 1 for whoever owns everything, 0 for the other."""
+        person = float(self._lately.owned(wishes).any())
+        return Shares(*(np.full(self._groups.channels.size, share) for share in (person, 1.0 - person)))
+
+
+class Blend:
+    """Both terms are in the MPC's objective, `(1 - α) ‖M_h (c - û_h)‖² + α ‖M_p (c - û_p)‖²`.
+
+    While the person moves nothing that contradicts it, the policy has its full weight; so has the person
+    where the policy owns nothing.
+
+    Args:
+        groups: of the robot's channels.
+        alpha: α, the policy's share: 0 is `ByMask`, 1 the policy alone.
+        handback: how long after a group was moved last it counts as moved [s].
+    """
+
+    def __init__(self, groups: Groups, alpha: float = 0.5, handback: float = HANDBACK) -> None:
+        if not 0.0 <= alpha <= 1.0:
+            raise HandrailError(f"blend: expected a policy's share from 0 to 1, got {alpha:g}")
+        self._groups, self._alpha, self._lately = groups, alpha, Lately(groups, handback)
+
+    def reset(self) -> None:
+        """Begin an episode."""
+        self._lately.reset()
+
+    def shares(self, wishes: Wishes) -> Shares:
+        """Return both weights."""
+        owned = self._lately.owned(wishes)
+        policy = np.zeros_like(owned) if wishes.policy is None else wishes.policy.mask
+        contested = self._groups.taken(owned) & policy
+        opposed = owned & self._groups.taken(contested)
+        person = np.where(opposed, 1.0 - self._alpha, 1.0) * owned
+        return Shares(person, np.where(contested, self._alpha, 1.0))

@@ -1,0 +1,46 @@
+"""Twists of an intent in the usual frames: the base's in the base, a hand's along the world's axes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.robot.model import RobotModel
+
+_USUAL = Frames()
+
+
+def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent | None:
+    """Return the intent as it is meant in the usual frames at q, (n,); None where a mask cannot be turned.
+
+    A mask that has some axes of a translation or a rotation, but not all three, is of its own frame alone.
+    Unknown frames, and values of another size, stay: the controller brakes.
+    """
+    channels, frames = Channels.of(model.description), intent.frames
+    fits = intent.values.shape == intent.mask.shape == (channels.size,)
+    if not (fits and frames.are_known) or np.array_equal(frames.parameters, _USUAL.parameters):
+        return intent
+    values = np.where(intent.mask, intent.values, 0.0)
+    if frames.base == "world" and channels.base:
+        if intent.mask[0] != intent.mask[1]:
+            return None
+        values[:3] = turned(values[:3], -q[2])
+    poses = [model.pose(q, hand.named("tool")) for hand in model.description.hands]
+    places = [channels.hand_slice(hand) for hand in range(len(poses))]
+    if channels.pair:  # in the axes of the first hand
+        poses, places = [*poses, poses[0]], [*places, channels.pair_slice]
+    for hand, (pose, place) in enumerate(zip(poses, places, strict=True)):
+        parts = [slice(place.start + first, place.start + first + 3) for first in (0, 3)]
+        if any(np.ptp(intent.mask[part].astype(int)) for part in parts):
+            return None
+        rotation = np.asarray(pose.rotation)
+        if frames.tool == "tool":
+            for part in parts:
+                values[part] = rotation @ values[part]
+        if hand < len(model.description.hands):  # v of the tool point, of the one that moves with it
+            values[parts[0]] -= np.cross(values[parts[1]], rotation @ frames.point) * intent.mask[place.start]
+    return replace(intent, values=values, frames=_USUAL)

@@ -1,0 +1,138 @@
+"""A person and a policy steer one robot: an arbiter says who owns what, the MPC completes and keeps it safe.
+
+```
+person ─ intent ─┐
+                 ├▶ arbiter ─ weights ─▶ intents of two sources ─▶ controller
+policy ─ intent ─┘
+```
+Whatever the person says of the episode (pause, e-stop, success) comes first: the policy moves only while they
+supervise, with an input that is fresh.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.operators.operator import EpisodeEvent, Operator, View
+from handrail.collect.operators.shared.arbiter import PERSON, POLICY, Arbiter, Groups, Wishes
+from handrail.collect.operators.shared.by_input import HANDBACK
+from handrail.collect.operators.shared.frames import in_usual_frames
+from handrail.controllers.arrays import BoolArray
+from handrail.controllers.interface.channel_matrix import channel_matrix
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import LONG_AGO, Intent
+from handrail.controllers.interface.prediction import Prediction
+from handrail.controllers.interface.sources import Intents, Source
+from handrail.controllers.robot.model import RobotModel
+
+
+class CoPilot(Protocol):
+    """A policy as an operator that can be interrupted."""
+
+    ahead: Prediction | None
+    """What its plan asks for from now on; None of one that plans one step."""
+    doubt: float
+    """How unsure it is of its last answer; 0 if it does not say."""
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+
+    def replan(self) -> None:
+        """Forget the plan: the robot is elsewhere than it led."""
+
+    def act(self, view: View) -> Intent:
+        """Return the intent now."""
+        ...
+
+
+class SharedOperator:
+    """A person (or a script) and a policy as one operator.
+
+    The policy plans anew when the person hands something back. A gripper is the person's while they have
+    something of its hand, or have changed it a moment ago; until they change it, it stays as it is. A change
+    closes what is open and opens what is closed.
+
+    Args:
+        person: who supervises.
+        policy: who drives.
+        arbiter: says how much each weighs.
+        model: of the robot.
+        shares: whether a teleop mode can be shared, by its name; in others the person drives alone.
+    """
+
+    def __init__(
+        self,
+        person: Operator,
+        policy: CoPilot,
+        arbiter: Arbiter,
+        model: RobotModel,
+        shares: Callable[[str], bool] = lambda mode: True,
+    ) -> None:
+        self._person, self._policy, self._arbiter = person, policy, arbiter
+        self._model, self._shares = model, shares
+        self._channels = Channels.of(model.description)
+        self._groups = Groups(self._channels)
+        self._hands = len(model.description.hands)
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        self._person.reset(view, rng)
+        self._policy.reset(view, rng)
+        self._arbiter.reset()
+        self._closed = [0.0] * self._hands  # how far each gripper is asked to be closed
+        self._level: tuple[float, ...] = ()  # of each as the person's device says
+        self._changed = [-np.inf] * self._hands  # when the person changed each [s]
+        self._owned = np.zeros(self._channels.size, dtype=bool)
+        self._waits = False
+
+    def act(self, view: View) -> Intent | EpisodeEvent:
+        """Return both wishes as one intent, or what the person says of the episode."""
+        asked = self._person.act(view)
+        if isinstance(asked, EpisodeEvent):
+            self._waits = True
+            return asked
+        if self._waits:
+            self._policy.replan()
+            self._waits = False
+        asked = asked.of_hands(self._hands)
+        wanted = self._policy.act(view)
+        usable = wanted.is_finite and wanted.values.shape == (self._channels.size,)
+        person = in_usual_frames(asked, self._model, view.state.q)
+        if person is None or not (person.is_finite and person.frames.are_known and self._shares(asked.mode)):
+            return asked
+        return self._merged(person, wanted if usable else None, view)
+
+    def _merged(self, person: Intent, policy: Intent | None, view: View) -> Intent:
+        """Return the sum of both, by the arbiter's weights."""
+        time = view.state.time
+        realised = channel_matrix(self._model, self._channels, view.state.q) @ view.state.v
+        shares = self._arbiter.shares(Wishes(time, person, policy, realised, self._policy.doubt))
+        owned = person.mask & (shares.person > 0.0)
+        if np.any(self._owned & ~owned):
+            self._policy.replan()
+        self._owned = owned
+        mine = self._take_grippers(person, owned, time)
+        if policy is not None:
+            wanted = zip(self._closed, policy.of_hands(self._hands).grippers, mine, strict=True)
+            self._closed = [now if own else then for now, then, own in wanted]
+        sources = [Source(PERSON, person, shares.person)]
+        if policy is not None:
+            policy = replace(policy, mode=person.mode)
+            sources.append(Source(POLICY, policy, shares.policy, self._policy.ahead))
+        intents = Intents.of(sources, tuple(self._closed), person)
+        if policy is None and not owned.any():  # nobody drives
+            intents = replace(intents, time=LONG_AGO)
+        return replace(intents, of_grippers=tuple(PERSON if own else POLICY for own in mine))
+
+    def _take_grippers(self, person: Intent, owned: BoolArray, time: float) -> list[bool]:
+        """Do what the person says of the grippers; return which are theirs."""
+        last, self._level = self._level or person.grippers, person.grippers
+        for hand, (level, before) in enumerate(zip(person.grippers, last, strict=True)):
+            if level != before:
+                same = round(level) == round(self._closed[hand])
+                self._closed[hand] = 1.0 - level if same else level
+                self._changed[hand] = time
+        has = self._groups.grippers(owned)
+        return [own or time - then < HANDBACK for own, then in zip(has, self._changed, strict=True)]
