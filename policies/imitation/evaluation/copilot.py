@@ -31,7 +31,7 @@ from handrail.policies.imitation.interface.trained import load_policy
 def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOperator:
     """Return a person and the policies of the settings as one operator.
 
-    In real time the policy plans in a thread of its own. Several policies are an ensemble, whose first drives.
+    In real time the policy plans in a thread of its own. Several are an ensemble, whose first drives.
 
     Args:
         config: of the recording.
