@@ -9,6 +9,7 @@ from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Prediction, after, constant
 
+PERSON, POLICY = "person", "policy"  # names of the sources of a robot that both steer
 _ROUNDING = 1e-9  # of a time [s]
 
 
