@@ -4,6 +4,7 @@ from handrail.collect.config import RecordConfig
 from handrail.collect.execution.pool import RECORDING, begin_loading
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.user_study.config import StudySessionConfig
+from handrail.controllers.errors import check_installed
 from handrail.scripts import cli
 
 
@@ -13,9 +14,13 @@ def record(config: RecordConfig) -> int:
         cli.say_starting()
     if config.is_shared and not config.ray:
         begin_loading(RECORDING)  # the workers' modules, beside this process's own
+    share = None
+    if config.policy:
+        check_installed("--policy", ("torch",), "train")
+        from handrail.policies.imitation.evaluation.copilot import share
     from handrail.collect.commands import record
 
-    return record.record(config)
+    return record.record(config, share)
 
 
 def user_study(config: StudySessionConfig) -> int:

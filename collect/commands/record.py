@@ -1,6 +1,7 @@
 """Records episodes into a dataset, with a progress bar, and says what came of it."""
 
 import time
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from handrail.collect.config import RecordConfig
 from handrail.collect.execution.execution import Execution, WorkBar
 from handrail.collect.execution.pool import RECORDING
 from handrail.collect.operators.catalogue import OPERATORS
+from handrail.collect.operators.operator import Operator
 from handrail.collect.session.build import build_env, build_mode
 from handrail.collect.session.display import Display
 from handrail.collect.world.env import HandrailEnv
@@ -28,23 +30,28 @@ from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
 
+Share = Callable[[RecordConfig, Operator, HandrailEnv], Operator]
 
-def record(config: RecordConfig) -> int:
+
+def record(config: RecordConfig, share: Share | None = None) -> int:
     """Record as configured; return the exit code: 0, 1 after a failure, 130 after Ctrl-C.
 
     Args:
         config: of the recording.
+        share: lets policies of the settings drive beside a person.
     """
     console, log, shards = Terminal(stderr=True), RecordingLog(), Shards(config)
     if config.is_shared or shards.begun:
         saved = _record_shared(config, shards, log, console)
     else:
-        saved = _record_here(config, log, console)
+        saved = _record_here(config, share, log, console)
     log.report(config, *saved, console)
     return log.exit_code
 
 
-def _record_here(config: RecordConfig, log: RecordingLog, console: Terminal) -> tuple[Path, int, int]:
+def _record_here(
+    config: RecordConfig, share: Share | None, log: RecordingLog, console: Terminal
+) -> tuple[Path, int, int]:
     """Record in this process; return the dataset's folder and its episodes and frames."""
     interactive = OPERATORS.find(config.operator).interactive
     if interactive or config.robot_client:
@@ -58,7 +65,8 @@ def _record_here(config: RecordConfig, log: RecordingLog, console: Terminal) -> 
         if interactive and not config.resume:  # before a person's page is opened, or their device
             check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
         people = _people(config, env, console, stack)
-        recording = Recording(config, env, people, displays)
+        beside = (lambda person: share(config, person, env)) if share else None
+        recording = Recording(config, env, people, displays, beside)
         writer = stack.enter_context(session_writer(config, env))
         _print_state(writer, console)
         recording.into(writer)

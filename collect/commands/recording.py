@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.config import FoundDatasetConfig, RecordConfig
-from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.operators.operator import EpisodeEvent, Operator
 from handrail.collect.session.build import build_env, build_modes, build_session, session_features
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import COLUMN as SETTINGS
@@ -45,19 +45,26 @@ class Recording:
         env: of the recording.
         people: whoever steers now at this computer; none where a script does.
         displays: what else watches, and hears how episodes went.
+        share: returns who steers where a policy drives beside them.
 
     Attributes:
         columns: what the metadata of the episodes to come says of the session; may change between two.
     """
 
     def __init__(
-        self, config: RecordConfig, env: HandrailEnv, people: Sequence[Any] = (), displays: Sequence[Any] = ()
+        self,
+        config: RecordConfig,
+        env: HandrailEnv,
+        people: Sequence[Any] = (),
+        displays: Sequence[Any] = (),
+        share: Callable[[Operator], Operator] | None = None,
     ) -> None:
         self._config, self._env, self._people = config, env, people
         self.columns = session_columns(config)
         self._recorder = Recorder(config.dataset.single_task or env.task.description, self.columns)
         self._observers: list[Any] = [self._recorder, *displays, *people]
-        self._session = build_session(config, env, self._observers, config.dataset.fps, *people)
+        person = people[0] if people else None
+        self._session = build_session(config, env, self._observers, config.dataset.fps, person, share)
 
     def into(self, writer: EpisodeWriter) -> None:
         """Save the episodes to come in a dataset."""
@@ -153,7 +160,7 @@ def session_columns(config: RecordConfig) -> dict[str, Scalar]:
 
 def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     """Return the writer of a recording's dataset, new or resumed."""
-    dataset, features = config.dataset, session_features(env)
+    dataset, features = config.dataset, session_features(env, bool(config.policy))
     manifest = Manifest(
         dataset.name, dataset.fps, env.model.description.name, features, versions(*SIMULATION)
     )

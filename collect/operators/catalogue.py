@@ -37,6 +37,11 @@ OPERATORS = Registry(
             "a script with a human-like hand",
         ),
         OperatorSpec(
+            "supervisor",
+            "handrail.collect.operators.shared.supervisor:supervisor",
+            "a script that watches a policy (--policy) and helps where it gets no further",
+        ),
+        OperatorSpec(
             "browser",
             "handrail.collect.cockpit.cockpit:open_cockpit",
             "a person at a browser, with keys, a gamepad or touch",

@@ -84,6 +84,7 @@ def build_session(
     observers: Sequence[Observer] = (),
     fps: float | None = None,
     person: Operator | None = None,
+    share: Callable[[Operator], Operator] | None = None,
 ) -> Session:
     """Return the session of an environment.
 
@@ -93,6 +94,7 @@ def build_session(
         observers: shown every frame.
         fps: recording rate [Hz]; the robot's by default.
         person: who steers now and may change the mode, instead of the operator of the settings.
+        share: returns who steers where a policy drives beside them.
     """
     fps = fps or env.fps
     control_fps = config.control_fps or fps
@@ -102,7 +104,7 @@ def build_session(
     return Session(
         env,
         ModeController(build_modes(config, env), build, mode, model) if person else build(mode, model),
-        operator,
+        share(operator) if share else operator,
         observers,
         realtime=(config.realtime or person is not None) and not env.real,
         control_period=1.0 / control_fps,
@@ -151,7 +153,12 @@ def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode
     fit = fitting(MODES, len(env.model.description.hands))
     modes = [build_mode(replace(config, mode=name, mask=""), env.model) for name in fit]
     channels, hand = Channels.of(env.model.description), env.model.hand.name
-    known = [mode for mode in modes if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))]
+    known = [
+        mode
+        for mode in modes
+        if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))
+        and CONTROLLERS.find(mode.controller).fits(env.model.description)
+    ]
     return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
 
 

@@ -44,7 +44,9 @@ class Person:
         values[self.channels.names.index("ee.vz")] = 0.1 * (self.frame in HAND)
         values[self.channels.names.index("base.vx")] = 0.1 * (self.frame in BASE)
         mask = self.channels.mask("base", "ee")
-        return Intent(values, mask, (float(self.frame >= CLOSES),), "ee", view.state.time)
+        raw = RawInput(axes=int(np.count_nonzero(values)), device="stick")
+        closes = (float(self.frame >= CLOSES),)
+        return Intent(values, mask, closes, "ee", view.state.time, raw=raw)
 
 
 @dataclass
@@ -52,7 +54,6 @@ class Policy:
     """Wants one thing throughout; now and then it has no usable answer."""
 
     channels: Channels
-    ahead = None
     doubt = 0.0
 
     def reset(self, view, rng):
@@ -60,6 +61,9 @@ class Policy:
 
     def replan(self):
         pass
+
+    def chunk(self):
+        return []
 
     def act(self, view):
         frame = round(view.state.time * FPS)

@@ -11,7 +11,7 @@ from handrail.collect.operators.scripted.hand import HumanHand, Perception
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.input_map import InputMap, LeaderArmMap, StickMap
 from handrail.collect.operators.scripted.single_axis import SingleAxisMap
-from handrail.collect.operators.scripted.steering import Gains, MotionGoal
+from handrail.collect.operators.scripted.steering import Gains, MotionGoal, Target
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.intent import Intent, RawInput
@@ -75,6 +75,7 @@ class ScriptedOperator:
 
     Attributes:
         free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
+        target: where the goal of the last intent leads; None to rest.
     """
 
     def __init__(
@@ -92,6 +93,7 @@ class ScriptedOperator:
         self._perception = Perception(self._settings, rng)
         self._hand = HumanHand(self._settings, self._map.full, self._map.fine, rng)
         self._map.reset(view, self._settings, rng)
+        self.target: Target | None = None
         self._mask: BoolArray | None = None
         self._switches = 0
         self.free_at = -np.inf
@@ -100,6 +102,7 @@ class ScriptedOperator:
         """Return the intent now: the goal in this mode's channels, as the hand manages it."""
         time = view.state.time
         goal = self._script.motion_goal(view)
+        self.target = goal.target
         tool = goal.target.steered(view.task) if goal.target else view.tool
         goal = self._perception.see(goal, tool, time)
         mask, wanted = self._map.wanted(goal, view.state)

@@ -79,3 +79,8 @@ class Blend:
         opposed = owned & self._groups.taken(contested)
         person = np.where(opposed, 1.0 - self._alpha, 1.0) * owned
         return Shares(person, np.where(contested, self._alpha, 1.0))
+
+
+def by_mask(groups: Groups, settings: object) -> ByMask:
+    """Temporary."""
+    return ByMask(groups)

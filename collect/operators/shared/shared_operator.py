@@ -11,40 +11,20 @@ supervise, with an input that is fresh.
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.operators.operator import EpisodeEvent, Operator, View
 from handrail.collect.operators.shared.arbiter import Arbiter, Groups, Wishes
 from handrail.collect.operators.shared.by_input import HANDBACK
-from handrail.collect.operators.shared.frames import in_usual_frames
+from handrail.collect.operators.shared.planning import Planner
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import LONG_AGO, Intent
-from handrail.controllers.interface.prediction import Prediction
-from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Source
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Preview, Source
+from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.robot.model import RobotModel
-
-
-class CoPilot(Protocol):
-    """A policy as an operator that can be interrupted."""
-
-    ahead: Prediction | None
-    """What its plan asks for from now on; None of one that plans one step."""
-    doubt: float
-    """How unsure it is of its last answer; 0 if it does not say."""
-
-    def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Begin an episode."""
-
-    def replan(self) -> None:
-        """Forget the plan: the robot is elsewhere than it led."""
-
-    def act(self, view: View) -> Intent:
-        """Return the intent now."""
-        ...
 
 
 class SharedOperator:
@@ -65,7 +45,7 @@ class SharedOperator:
     def __init__(
         self,
         person: Operator,
-        policy: CoPilot,
+        policy: Planner,
         arbiter: Arbiter,
         model: RobotModel,
         shares: Callable[[str], bool] = lambda mode: True,
@@ -79,7 +59,7 @@ class SharedOperator:
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
         self._person.reset(view, rng)
-        self._policy.reset(view, rng)
+        self._policy.reset(view, rng.spawn(1)[0])  # what the person draws is as without a policy
         self._arbiter.reset()
         self._closed = [0.0] * self._hands  # how far each gripper is asked to be closed
         self._level: tuple[float, ...] = ()  # of each as the person's device says
@@ -97,12 +77,17 @@ class SharedOperator:
             self._policy.replan()
             self._waits = False
         asked = asked.of_hands(self._hands)
-        wanted = self._policy.act(view)
-        usable = wanted.is_finite and wanted.values.shape == (self._channels.size,)
+        wanted = self._wanted(view)
         person = in_usual_frames(asked, self._model, view.state.q)
         if person is None or not (person.is_finite and person.frames.are_known and self._shares(asked.mode)):
             return asked
-        return self._merged(person, wanted if usable else None, view)
+        return self._merged(person, wanted, view)
+
+    def _wanted(self, view: View) -> Intent | None:
+        """Return what the policy wants; None of an answer that no controller accepts."""
+        wanted = self._policy.act(view)
+        fits = wanted.values.shape == (self._channels.size,) and wanted.is_finite
+        return wanted if fits else None
 
     def _merged(self, person: Intent, policy: Intent | None, view: View) -> Intent:
         """Return the sum of both, by the arbiter's weights."""
@@ -110,8 +95,9 @@ class SharedOperator:
         realised = channel_matrix(self._model, self._channels, view.state.q) @ view.state.v
         shares = self._arbiter.shares(Wishes(time, person, policy, realised, self._policy.doubt))
         owned = person.mask & (shares.person > 0.0)
-        if np.any(self._owned & ~owned):
+        if np.any(self._owned & ~owned):  # handed back: what was planned before led from elsewhere
             self._policy.replan()
+            policy = self._wanted(view)
         self._owned = owned
         mine = self._take_grippers(person, owned, time)
         if policy is not None:
@@ -120,19 +106,28 @@ class SharedOperator:
         sources = [Source(PERSON, person, shares.person)]
         if policy is not None:
             policy = replace(policy, mode=person.mode)
-            sources.append(Source(POLICY, policy, shares.policy, self._policy.ahead))
+            sources.append(Source(POLICY, policy, shares.policy, self._ahead(policy)))
         intents = Intents.of(sources, tuple(self._closed), person)
         if policy is None and not owned.any():  # nobody drives
             intents = replace(intents, time=LONG_AGO)
         return replace(intents, of_grippers=tuple(PERSON if own else POLICY for own in mine))
 
+    def _ahead(self, now: Intent) -> Preview | None:
+        """Return what the policy has planned, if it plans ahead."""
+        plan = [now, *self._policy.chunk()]
+        if len(plan) == 1:
+            return None
+        return Preview(np.array([each.values for each in plan]), np.array([each.time for each in plan]))
+
     def _take_grippers(self, person: Intent, owned: BoolArray, time: float) -> list[bool]:
-        """Do what the person says of the grippers; return which are theirs."""
+        """Do what the person says of the grippers; return which are theirs. A script means what it says."""
         last, self._level = self._level or person.grippers, person.grippers
+        has, device = self._groups.grippers(owned), bool(person.raw.device)
         for hand, (level, before) in enumerate(zip(person.grippers, last, strict=True)):
-            if level != before:
+            if not device:
+                self._closed[hand] = level if has[hand] else self._closed[hand]
+            elif level != before:
                 same = round(level) == round(self._closed[hand])
                 self._closed[hand] = 1.0 - level if same else level
                 self._changed[hand] = time
-        has = self._groups.grippers(owned)
         return [own or time - then < HANDBACK for own, then in zip(has, self._changed, strict=True)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.operators.operator import Operator, View
+from handrail.collect.operators.operator import Operator
 from handrail.collect.session.build import build_controller, build_env
 from handrail.collect.session.disturbances import DelayedOperator, OtherPictures, Pusher
 from handrail.collect.session.outcome import Outcome
@@ -24,17 +24,10 @@ from handrail.controllers.baselines.unprotected import unprotected_controller
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
-from handrail.policies.imitation.evaluation.conditions import (
-    Checkpoint,
-    PolicyCondition,
-    mode_action,
-    own_protection,
-)
+from handrail.policies.imitation.evaluation.conditions import PolicyCondition, own_protection
+from handrail.policies.imitation.evaluation.policy_operator import PolicyOperator, RecordedColumns
 from handrail.policies.imitation.interface.compute import threads
-from handrail.policies.imitation.interface.interface import PolicyInterface
-from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.trained import TrainedPolicy, repeatable
 
 Load = Callable[[Path], TrainedPolicy]
@@ -42,81 +35,6 @@ Row = dict[str, Any]
 _STAND_IN = {"mpc": "joints", "filter": "direct_filtered"}  # the mode whose controller it is
 _LATELY = 5.0  # [s]
 _STILL = 0.05  # extent of the tool's way in that time, at the scale of the robot's world [m]
-
-
-class RecordedColumns:
-    """Reads and writes what was recorded, in place of a `PolicyInterface`: an action is a mode's channels.
-
-    Args:
-        checkpoint: of a policy that does; of mode `direct`, or none, an action is joint velocities.
-    """
-
-    def __init__(self, checkpoint: Checkpoint) -> None:
-        self._action, self._joined = mode_action(checkpoint.meta), checkpoint.joined
-        self.action_names = self._action.names
-
-    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the observation."""
-        return (np.append(state, environment), environment[:0]) if self._joined else (state, environment)
-
-    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
-        """Return the intent on the mode's channels."""
-        return self._action.intent(action, 0.0)
-
-
-class PolicyOperator:
-    """Lets a policy steer; an operator.
-
-    An action of another size, or one that is not finite, becomes an intent that no controller accepts: the
-    robot brakes.
-
-    Args:
-        policy: whoever was trained.
-        interface: what it reads and writes.
-        channels: of the robot.
-        mode: name of the teleop mode that the intents carry.
-        task: one sentence: what to do.
-
-    Attributes:
-        malformed: unusable actions of this episode so far.
-    """
-
-    def __init__(
-        self,
-        policy: TrainedPolicy,
-        interface: PolicyInterface | RecordedColumns,
-        channels: Channels,
-        mode: str,
-        task: str = "",
-    ) -> None:
-        self._policy, self._interface, self._mode, self._task = policy, interface, mode, task
-        self._unusable = Intent(np.full(channels.size, np.nan), np.ones(channels.size, bool))
-        self._memory = SceneMemory(policy.encoder.reads) if policy.encoder else None
-        self.malformed = 0
-
-    def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Begin an episode."""
-        self._policy.reset()
-        if self._memory:
-            self._memory.forget()
-        self.malformed = 0
-
-    def act(self, view: View) -> Intent:
-        """Return the intent now."""
-        seen = view.observation
-        state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
-        if self._memory and self._policy.encoder:
-            seen_now = {name: each[None] for name, each in pictures.items()}
-            said = self._policy.encoder.look(seen_now, state[None])
-            around = self._memory.take(said, 0)
-        observed = self._interface.observe(state, around)
-        action = np.asarray(self._policy.act(*observed, pictures, self._task))
-        if action.shape == (len(self._interface.action_names),) and np.all(np.isfinite(action)):
-            intent = self._interface.decode(action, seen["agent_pos"])
-        else:
-            self.malformed += 1
-            intent = self._unusable
-        return replace(intent, mode=self._mode, time=view.state.time)
 
 
 class RolloutProgress:

@@ -1,5 +1,6 @@
 """A trained policy that drives; its numbers, and what PyTorch holds meanwhile."""
 
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from handrail.controllers.errors import HandrailError, message_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import encoder_of
-from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT, STATE
 from handrail.policies.imitation.interface.steps import without_steps
 from handrail.policies.imitation.interface.trust import WEIGHTS, check_policy_folder, registered_policies
 
@@ -73,6 +74,23 @@ class TrainedPolicy:
         except Exception as error:  # of LeRobot and all below it
             kind = self.policy.config.type
             raise HandrailError(f"policy {kind}: cannot act: {message_of(error)}") from error
+
+    def planned(self) -> FloatArray:
+        """Return the actions that are planned beyond the last one, (K, a) float32; none of other kinds."""
+        rows = list(self._queue)
+        with torch.inference_mode():
+            return self.after(torch.cat(rows)).cpu().numpy() if rows else np.zeros((0, 0), np.float32)
+
+    def skip(self, count: int) -> None:
+        """Leave out so many planned actions: their time is over."""
+        for _ in range(min(count, len(self._queue))):
+            self._queue.popleft()
+
+    @property
+    def _queue(self) -> deque[Any]:
+        """What LeRobot's policy has planned: ACT and Diffusion keep it in one of two places."""
+        queues = getattr(self.policy, "_queues", None) or {}
+        return getattr(self.policy, "_action_queue", queues.get(ACTION, deque()))
 
 
 def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:

@@ -1,0 +1,119 @@
+"""A trained policy, as an operator."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from handrail.collect.operators.operator import View
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+from handrail.policies.imitation.evaluation.conditions import Checkpoint, mode_action
+from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
+from handrail.policies.imitation.interface.trained import TrainedPolicy
+
+
+class RecordedColumns:
+    """Reads and writes what was recorded, in place of a `PolicyInterface`: an action is a mode's channels.
+
+    Args:
+        checkpoint: of a policy that does; of mode `direct`, or none, an action is joint velocities.
+    """
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        self._action, self._joined = mode_action(checkpoint.meta), checkpoint.joined
+        self.action_names = self._action.names
+
+    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the observation."""
+        return (np.append(state, environment), environment[:0]) if self._joined else (state, environment)
+
+    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
+        """Return the intent on the mode's channels."""
+        return self._action.intent(action, 0.0)
+
+
+class PolicyOperator:
+    """Lets a policy steer; an operator.
+
+    An action of another size, or one that is not finite, becomes an intent that no controller accepts: the
+    robot brakes. What was planned for moments at which nobody asked is left out.
+
+    Args:
+        policy: whoever was trained.
+        interface: what it reads and writes.
+        channels: of the robot.
+        mode: name of the teleop mode that the intents carry.
+        task: one sentence: what to do.
+        period: from one of its actions to the next [s]; 0 where it is asked at each of them.
+
+    Attributes:
+        malformed: unusable actions of this episode so far.
+        doubt: 0: it does not say how unsure it is.
+    """
+
+    doubt = 0.0
+
+    def __init__(
+        self,
+        policy: TrainedPolicy,
+        interface: PolicyInterface | RecordedColumns,
+        channels: Channels,
+        mode: str,
+        task: str = "",
+        period: float = 0.0,
+    ) -> None:
+        self._policy, self._interface, self._mode, self._task = policy, interface, mode, task
+        self._unusable = Intent(np.full(channels.size, np.nan), np.ones(channels.size, bool))
+        self._memory = SceneMemory(policy.encoder.reads) if policy.encoder else None
+        self._period = period
+        self.malformed = 0
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        if self._memory:
+            self._memory.forget()
+        self.malformed = 0
+        self.replan()
+
+    def replan(self) -> None:
+        """Forget what is planned; what was seen is remembered."""
+        self._policy.reset()
+        self._asked, self._state = np.inf, np.zeros(0)
+
+    def act(self, view: View) -> Intent:
+        """Return the intent now."""
+        seen = view.observation
+        state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
+        if self._memory and self._policy.encoder:
+            seen_now = {name: each[None] for name, each in pictures.items()}
+            said = self._policy.encoder.look(seen_now, state[None])
+            around = self._memory.take(said, 0)
+        if self._period and view.state.time > self._asked + 1.5 * self._period:
+            self._policy.skip(round((view.state.time - self._asked) / self._period) - 1)
+        self._asked, self._state = view.state.time, state
+        observed = self._interface.observe(state, around)
+        action = np.asarray(self._policy.act(*observed, pictures, self._task))
+        if self._fits(action):
+            intent = self._interface.decode(action, state)
+        else:
+            self.malformed += 1
+            intent = self._unusable
+        return replace(intent, mode=self._mode, time=view.state.time)
+
+    def chunk(self) -> list[Intent]:
+        """Return what is planned for the periods after the last intent, as meant where the robot was then."""
+        rows = self._policy.planned()
+        usable = [row for row in rows if self._fits(row)]
+        if len(usable) < len(rows) or not len(self._state):
+            return []
+        decoded = (self._interface.decode(row, self._state) for row in usable)
+        times = self._asked + self._period * np.arange(1, len(usable) + 1)
+        return [
+            replace(each, mode=self._mode, time=float(time))
+            for each, time in zip(decoded, times, strict=True)
+        ]
+
+    def _fits(self, action: FloatArray) -> bool:
+        return action.shape == (len(self._interface.action_names),) and bool(np.all(np.isfinite(action)))
