@@ -1,0 +1,41 @@
+"""The arbiters by name; light to import."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from handrail.controllers.registry import Registry
+
+
+@dataclass(frozen=True)
+class ArbiterSpec:
+    """An arbiter: one entry makes it."""
+
+    name: str  # as on the command line, and what the dataset says of who decided
+    build: Callable[..., Any] | str
+    """`(groups, settings) -> Arbiter`, or where that is, `module:name`. It gets the `Groups` of the robot's
+    channels and the `ArbiterSettings`."""
+    help: str  # one line
+
+
+_HERE = "handrail.collect.operators.shared"
+ARBITERS = Registry(
+    "arbiter",
+    ArbiterSpec,
+    (
+        ArbiterSpec(
+            "by_mask", f"{_HERE}.by_input:ByMask", "the person has what they move, the policy keeps the rest"
+        ),
+        ArbiterSpec("whole", f"{_HERE}.by_input:Whole", "any input of the person takes the whole robot"),
+        ArbiterSpec("blend", f"{_HERE}.by_input:Blend", "where both ask, both are in the MPC's objective"),
+        ArbiterSpec(
+            "emics", f"{_HERE}.emics:emics", "the whole robot changes hands where it makes too little way"
+        ),
+        ArbiterSpec(
+            "hier_emics",
+            f"{_HERE}.emics:hier_emics",
+            "as emics, but never against a person with a purpose, nor to one who is away",
+        ),
+        ArbiterSpec("risk", f"{_HERE}.risk:Risk", "as by_mask, but the policy lets go while it is unsure"),
+    ),
+)
