@@ -11,7 +11,7 @@ from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.collect.operators.shared.shared_operator import SharedOperator
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model
 
@@ -34,7 +34,8 @@ def asks(*groups, value=0.2, model=ONE, mode="base+ee", **other):
     """Return an intent that owns some groups and moves all of them with a value; 0 rests on the stick."""
     channels = channels_of(model)
     mask = channels.mask(*groups) if groups else np.zeros(channels.size, bool)
-    return Intent(value * mask, mask, mode=mode, **other)
+    raw = RawInput(axes=int(np.count_nonzero(value * mask)), device="stick")
+    return Intent(value * mask, mask, mode=mode, **({"raw": raw} | other))
 
 
 class Course:

@@ -215,7 +215,7 @@ def test_hand_overs_keep_the_limits_of_acceleration(name):
             policy.doubt = rng.choice([0.0, 1.0])
         found = operator.act(View(robot.state, None))
         robot.update(found)
-        owners.add(tuple(source.name for source in found.active))
+        owners.add(tuple(source.name for source, *_ in found.terms))
     limits = ONE.description.limits
     assert np.max(np.abs(robot.steps) / (limits.acceleration * robot.period)) < 1.0 + 1e-6
     speeds = [command.velocity(0.0) for command in robot.commands]

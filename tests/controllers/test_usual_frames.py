@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from arbiter_helpers import ONE, TWO, channels_of
 
-from handrail.collect.operators.shared.frames import in_usual_frames
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
 
