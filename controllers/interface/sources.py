@@ -26,9 +26,14 @@ class Source:
         return np.where(self.intent.mask, self.weight, 0.0)
 
     @property
+    def owns(self) -> bool:
+        """Whether it has channels and a weight, of whatever size."""
+        return bool(np.any(self.intent.mask) and np.any(self.weight))
+
+    @property
     def is_active(self) -> bool:
         """Whether it has a weight on some channel that it owns."""
-        return bool(np.any(self.intent.mask & (np.asarray(self.weight) != 0.0)))
+        return self.owns and bool(np.any(self.intent.mask & (np.asarray(self.weight) != 0.0)))
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,7 @@ class Intents(Intent):
             base: whose mode, frames and raw input it has; and its time, where no source owns a channel.
         """
         size = len(base.values)
-        owners = [source for source in sources if np.any(source.intent.mask) and np.any(source.weight)]
+        owners = [source for source in sources if source.owns]
         usable = all(_fits(source, base) for source in owners)
         active = tuple(source for source in owners if source.is_active) if usable else ()
         shares = [source.share() for source in active]
@@ -109,7 +114,7 @@ def merged(values: Sequence[FloatArray], shares: Sequence[FloatArray], size: int
         return np.where(shares[0] > 0.0, values[0], 0.0)
     total = np.sum(shares, axis=0)
     part = [np.divide(share, total, out=np.zeros_like(total), where=total > 0.0) for share in shares]
-    terms = [np.where(each > 0.0, each * value, 0.0) for each, value in zip(part, values, strict=True)]
+    terms = [each * np.where(each > 0.0, value, 0.0) for each, value in zip(part, values, strict=True)]
     return np.sum(terms, axis=0)
 
 

@@ -45,5 +45,5 @@ def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent 
             for part in parts:
                 values[part] = rotation @ values[part]
         if hand < len(model.description.hands):  # v of the tool point, of the one that moves with it
-            values[parts[0]] -= np.cross(values[parts[1]], rotation @ frames.point) * intent.mask[place.start]
+            values[parts[0]] -= np.cross(values[parts[1]], rotation @ frames.point)
     return replace(intent, values=values, frames=_USUAL)
