@@ -72,8 +72,8 @@ class Performance:
     """Whoever drives loses the robot if it makes too little of the way that the policy would make.
 
     With the policy's wish û on its channels and what these do, c, the error of goal-directed motion is
-    `e = ‖û‖ - û·c / max(‖û‖, ε)`, and `E = ⟨e⟩ / max(⟨‖û‖⟩, ε)`: 0 as fast as the policy toward its goal, 1
-    no way at all, more: away from it. Metres and radians count alike.
+    `e = ‖û‖ - û·c / max(‖û‖, ε)`, from 0 to 2 ‖û‖, and `E = ⟨e⟩ / max(⟨‖û‖⟩, ε)`: 0 as fast as the policy
+    toward its goal, 1 no way at all, more: away from it. Metres and radians count alike.
 
     Args:
         settings: the threshold of E, the window of its means.
@@ -97,8 +97,8 @@ class Performance:
         wish, done = wishes.policy.values[mask], wishes.realised[mask]
         wish = wish / max(float(np.linalg.norm(wish)) / _FAST, 1.0)
         speed = float(np.linalg.norm(wish))
-        error = speed - wish @ done / max(speed, _SLOW)
-        missing, possible = self._mean.add(np.array([error, speed]), wishes.time)
+        made = np.clip(wish @ done / max(speed, _SLOW), -speed, speed)
+        missing, possible = self._mean.add(np.array([speed - made, speed]), wishes.time)
         other = POLICY if level == PERSON else PERSON
         return other if missing > self._threshold * max(possible, _SLOW) else None
 

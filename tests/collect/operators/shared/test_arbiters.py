@@ -79,6 +79,13 @@ def test_it_goes_back_a_moment_after_it_was_let_go(name):
     assert np.all(shares.policy == 1.0)
 
 
+@pytest.mark.parametrize("name", BY_INPUT)
+def test_without_a_moment_more_it_is_theirs_while_it_moves(name):
+    course = Course(arbiter(name, handback=0.0))
+    assert np.all(course.go(PUSHES, POLICY).person[PUSHES.mask] > 0.0)
+    assert not np.any(course.go(RESTS, POLICY).person[RESTS.mask])
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_new_episode_is_as_the_first(name):
     def told(decides):

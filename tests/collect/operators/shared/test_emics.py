@@ -52,11 +52,26 @@ def test_motion_that_leads_elsewhere_is_no_way():
     assert drives(course.go(PUSHES, policy, 5.0, realised=aside)) == "policy"
 
 
-def test_a_policy_that_wants_to_stand_takes_nothing():
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_policy_that_wants_to_stand_takes_nothing(way):
     course = Course(arbiter("emics"))
     calm = asks("base", "ee", value=1e-3)
-    course.go(PUSHES, calm)
-    assert set(swayed(course, 20.0, calm, realised=PUSHES.values)) == {"person"}
+    assert set(swayed(course, 20.0, calm, realised=way * PUSHES.values)) == {"person"}
+
+
+def test_a_policy_that_twitches_takes_nothing():
+    course, still = Course(arbiter("emics")), asks("base", "ee", value=0.0)
+    swayed(course, 5.0, still)
+    assert set(swayed(course, PERIOD) + swayed(course, 1.0, still)) == {"person"}
+
+
+def test_whoever_drives_anew_is_judged_anew():
+    """The policy failed, the person does well."""
+    course = Course(arbiter("emics", window=2.0, dwell=0.5))
+    while drives(course.go(RESTS, POLICY, realised=-POLICY.values)) == "policy":
+        assert course.time < 1.0
+    found = {drives(course.go(PUSHES, POLICY, realised=POLICY.values)) for _ in range(60)}
+    assert found == {"person"}
 
 
 def test_a_person_who_lets_go_gives_the_robot_back_by_and_by():
