@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handrail.collect.cockpit.ahead import AHEAD, base_ahead, hands_ahead
 from handrail.collect.cockpit.episodes import DiskRoom
 from handrail.collect.cockpit.nearest import NearestPair
-from handrail.collect.cockpit.snapshot import AHEAD, STATUS, Snapshots, base_ahead, hands_ahead, reason
+from handrail.collect.cockpit.snapshot import STATUS, Snapshots, reason
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
