@@ -153,7 +153,12 @@ def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode
     fit = fitting(MODES, len(env.model.description.hands))
     modes = [build_mode(replace(config, mode=name, mask=""), env.model) for name in fit]
     channels, hand = Channels.of(env.model.description), env.model.hand.name
-    known = [mode for mode in modes if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))]
+    known = [
+        mode
+        for mode in modes
+        if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))
+        and CONTROLLERS.find(mode.controller).fits(env.model.description)
+    ]
     return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
 
 
