@@ -127,8 +127,7 @@ export class Marks {
   }
 
   row(points) {
-    while (this.balls.length < points.length) this.balls.push(this.ball.clone());
-    this.scene.add(...this.balls);
+    while (this.balls.length < points.length) this.scene.add(this.balls[this.balls.push(this.ball.clone()) - 1]);
     this.balls.forEach((ball, index) => {
       ball.visible = index < points.length;
       if (ball.visible) ball.position.set(...points[index]);
