@@ -1,4 +1,4 @@
-"""A law of devices beside a policy, from the command line: what is moved is the person's, the rest its own."""
+"""A law of devices beside a policy, from the command line: what is moved is the person's until let go."""
 
 import threading
 import time
