@@ -162,8 +162,8 @@ def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode
     return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
 
 
-def session_features(env: HandrailEnv) -> dict[str, Feature]:
-    """Return the dataset's columns of an environment."""
+def session_features(env: HandrailEnv, shared: bool = False) -> dict[str, Feature]:
+    """Return the dataset's columns of an environment; `shared` where a policy steers beside the person."""
     return frame_features(
         state=env.agent_names,
         environment=env.state_names,
@@ -172,4 +172,5 @@ def session_features(env: HandrailEnv) -> dict[str, Feature]:
         cameras=env.cameras,
         image_size=env.image_size,
         grippers=[hand.named("gripper") for hand in env.model.description.hands],
+        shared=shared,
     )
