@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.cockpit.ahead import base_ahead, hands_ahead
-from handrail.collect.operators.shared.arbiter import PERSON, POLICY
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.sources import Intents, Preview
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Preview
 from handrail.controllers.robot.model import Pose, RobotModel
 
 _POINTS = 8  # of a plan that are shown, at most

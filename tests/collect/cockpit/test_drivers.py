@@ -10,10 +10,9 @@ from places import ROOT
 
 from handrail.collect.cockpit.ahead import AHEAD, hands_ahead
 from handrail.collect.cockpit.drivers import drivers, of_person
-from handrail.collect.operators.shared.arbiter import PERSON, POLICY
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.sources import Intents, Preview, Source
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Preview, Source
 from handrail.controllers.robot.model import load_model
 
 ROBOTS = ("ridgeback_ur10", "tiago_pro", "lekiwi")

@@ -11,7 +11,7 @@ import pytest
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.operators.shared.arbiter import PERSON, POLICY, Groups
+from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.by_input import ByMask
 from handrail.collect.operators.shared.planning import Beside
 from handrail.collect.operators.shared.shared_operator import SharedOperator
@@ -20,6 +20,7 @@ from handrail.collect.session.loop import EpisodeLoop
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.sources import PERSON, POLICY
 
 LATE = 10  # periods until an answer: 0.5 s
 PERIOD = 0.05  # [s]
