@@ -193,7 +193,8 @@ class HandrailSim(Uncalibrated, Robot):
             return action
         numbers = self.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
         repeated = self._given is not None and action is self._given[0] and action == self._given[1]
-        self._given = action, dict(action)
+        if pressed(action) != HOLD:  # whoever holds between two of the same, wants nothing new
+            self._given = action, dict(action)
         button = self.watch(repeated) or (HOLD if repeated else pressed(action))
         if button in (NEXT, AGAIN):
             self._begin(self.scene + (button == NEXT))
