@@ -20,7 +20,7 @@ import handrail.collect.lerobot.plugins  # noqa: F401
 FLAG = re.compile(r"(?<![\w(-])--[a-z][\w.]*(?:-[a-z]\w*)*")
 STYLE = ("var(--", 'style="')  # of a page: what begins with "--" there is a colour
 OTHERS = {  # flags of other programs, by the word that the same text must say
-    "lerobot-rollout": "--strategy.type --strategy.smooth_handover --strategy.record_autonomous "
+    "--strategy.": "--strategy.type --strategy.smooth_handover --strategy.record_autonomous "
     "--strategy.keyboard.pause_resume --strategy.keyboard.correction",
     "lerobot-dataset-viz": "--repo-id --root --episode-index --save --output-dir",
     "lerobot-edit-dataset": "--repo_id --root --new_root --operation.type --operation.episode_indices",
