@@ -66,16 +66,13 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
     @property
     def task_names(self) -> tuple[str, ...]:
         """The tasks asked for."""
-        return names(self.tasks, fitting(TASKS, self._hands))
+        robot = load_description(self.robot)
+        return names(self.tasks, [name for name, spec in TASKS.items() if not spec.lacks(robot)])
 
     @property
     def mode_names(self) -> tuple[str, ...]:
         """The modes asked for."""
-        return names(self.modes, fitting(MODES, self._hands))
-
-    @property
-    def _hands(self) -> int:
-        return len(load_description(self.robot).hands)
+        return names(self.modes, fitting(MODES, len(load_description(self.robot).hands)))
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""
