@@ -1,6 +1,6 @@
 """The tasks by name; light to import."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,11 @@ class TaskSpec:
     movers: bool = False  # whether obstacles can move in it: the class has `moving_obstacles`
     hands: int = 1  # how many hands a robot needs for it
     large: bool = False  # whether its furniture comes in one size, for robots whose world has scale 1
+    parts: bool = False  # whether its hands go ways of their own
+
+    def refuses(self, groups: Iterable[str]) -> bool:
+        """Return whether channel groups of a mode move the hands as one, which go ways of their own."""
+        return self.parts and any(group.startswith("pair") for group in groups)
 
     def lacks(self, robot: "RobotDescription") -> str:
         """Return what a robot would need for it, and what it has; nothing of one that can do it."""
@@ -39,10 +44,11 @@ class TaskSpec:
 
 _TASKS, _SCRIPTS = "handrail.collect.world.tasks", "handrail.collect.operators.scripted"
 _TRAY = f"{_TASKS}.tray"
+_APART: dict[str, Any] = {"hands": 2, "parts": True}
 _LEVEL: dict[str, Any] = {
     "released_channels": ("ee.wx", "ee.wy"),  # its tilt is the MPC's
-    "large": True,
     "owned_channels": ("ee.vz",),  # who drives with it in hand minds how high it is
+    "large": True,
 }
 
 
@@ -57,11 +63,11 @@ TASKS = Registry(
     (
         _spec("carry_box", "CarryBox", "carry a box with both hands", hands=2, large=True),
         _spec("drawer", "Drawer", "pull it open", large=True),
-        _spec("fetch", "Fetch", "hold the drawer open and take the cube out", hands=2, large=True),
-        _spec("hand_over", "HandOver", "pass a bar from hand to hand into a bin", hands=2, large=True),
+        _spec("fetch", "Fetch", "hold the drawer open and take the cube out", **_APART, large=True),
+        _spec("hand_over", "HandOver", "pass a bar from hand to hand into a bin", **_APART, large=True),
         _spec("pick_place", "PickPlace", "carry a cube into a bin"),
         _spec("reach", "Reach", "bring the hand to a pose", movers=True),
-        _spec("reach_both", "ReachBoth", "bring each hand to a pose of its own", hands=2),
+        _spec("reach_both", "ReachBoth", "bring each hand to a pose of its own", **_APART),
         _spec("tray", "Tray", "carry a tray with a can on it", objectives=f"{_TRAY}:level_tray", **_LEVEL),
         TaskSpec(
             "wide_tray",

@@ -165,7 +165,8 @@ def run_trials(config: TrialsConfig, told: Callable[[OperatorTrial], None]) -> l
     config.check()
     file = trials_file(config)
     settings = replace(config, workers=1, ray="", json="trials.json", page="")  # what an episode depends on
-    keys = list(product(config.task_names, config.mode_names, range(config.episodes)))
+    cells = product(config.task_names, config.mode_names, range(config.episodes))
+    keys = [key for key in cells if not TASKS.find(key[0]).refuses(MODES.find(key[1]).groups("hand"))]
     jobs = [Job(" ".join(map(str, key)), run_trial, (settings, *key)) for key in keys if key not in file]
     with Execution(config, "episodes", preload=_PRELOAD) as execution:
         for result in execution.run(jobs):
