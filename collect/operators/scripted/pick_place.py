@@ -11,7 +11,6 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 
 _HELD = 0.05  # a cube this near to the tool point is held [m]
-_PUSHED = 0.015  # a cube so far from where it was is grasped anew [m]
 _BELOW = 0.005  # finger tips below the middle of the cube [m]
 _NEAR, _ALIGNED = 0.010, 0.10  # how exactly the hand has to be there to grasp [m, rad]
 _RETREAT = 0.40  # hand behind the table's edge while carrying [m]
@@ -23,11 +22,11 @@ class PickPlaceScript(PhasedScript):
     """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script."""
 
     def replan(self, view: View, name: str) -> list[ScriptPhase] | None:
-        """Grasp again when the cube stayed behind, or the hand pushed it on its way down."""
-        cube, place = view.task.pose("cube").position, self._phases[0].hand.position
-        pushed = name == "descend" and np.linalg.norm((cube - place)[:2]) > _PUSHED * self._grip
-        behind = name == "lift" and np.linalg.norm(cube - view.tool.position) >= _HELD * self._grip
-        return from_phase(self.plan(view), "above") if pushed or behind else None
+        """Grasp again when the cube stayed behind."""
+        cube = view.task.pose("cube").position
+        if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD * self._grip:
+            return None
+        return from_phase(self.plan(view), "above")
 
     def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the cube, over to the bin, and what is done at both."""
