@@ -54,7 +54,7 @@ class Term(NamedTuple):
             return
         if largest is not None:
             values = np.minimum(np.maximum(values, -largest), largest)
-        mean += np.where(self.part > 0.0, self.part * values, 0.0)
+        mean += self.part * np.where(self.part > 0.0, values, 0.0)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from handrail.collect.config import RecordConfig, SessionConfig
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.by_input import ByMask
+from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.collect.operators.shared.shared_operator import SharedOperator
 from handrail.collect.session.build import build_controller, build_env, build_mode, session_features
 from handrail.collect.session.recorder import Recorder
@@ -79,7 +80,7 @@ def record_takeovers(root: Path, episodes: int = 2, physics: bool = False, share
     config = replace(CONFIG, physics=physics)
     with closing(build_env(config, FPS)) as env:
         mode, channels = build_mode(config, env.model), Channels.of(env.model.description)
-        arbiter = ByMask(Groups(channels), HANDBACK)
+        arbiter = ByMask(Groups(channels), ArbiterSettings(handback=HANDBACK))
         operator = SharedOperator(Person(channels), Policy(channels), arbiter, env.model)
         recorder = Recorder("reach", session_columns(RecordConfig(**vars(config))))
         controller = build_controller(mode, env.model, FPS, config.task)

@@ -20,6 +20,8 @@ import handrail.collect.lerobot.plugins  # noqa: F401
 FLAG = re.compile(r"(?<![\w(-])--[a-z][\w.]*(?:-[a-z]\w*)*")
 STYLE = ("var(--", 'style="')  # of a page: what begins with "--" there is a colour
 OTHERS = {  # flags of other programs, by the word that the same text must say
+    "lerobot-rollout": "--strategy.type --strategy.smooth_handover --strategy.record_autonomous "
+    "--strategy.keyboard.pause_resume --strategy.keyboard.correction",
     "lerobot-dataset-viz": "--repo-id --root --episode-index --save --output-dir",
     "lerobot-edit-dataset": "--repo_id --root --new_root --operation.type --operation.episode_indices",
     "lerobot.robots.lekiwi.lekiwi_host": "--host.connection_time_s",
@@ -29,7 +31,7 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "accelerate launch": "--multi_gpu",
     "ray start": "--head --port --address --disable-usage-stats",
 }
-GROUPS = {"--human", "--cockpit", "--teleop", "--client", "--dataset"}  # of flags: --human.*
+GROUPS = {"--human", "--arbitration", "--cockpit", "--teleop", "--client", "--dataset"}  # of flags: --human.*
 # what starts Chromium, builds a wheel and the like
 FOREIGN = {
     "controllers/core/building.py",

@@ -43,7 +43,7 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
         fit = ", ".join(name for name, each in MODES.items() if _is_completed(each))
         raise HandrailError(f"--mode {mode.name}: expected one that the MPC completes beside a policy: {fit}")
     asked = EvaluateConfig(
-        task=config.task, robot=config.robot, mode="" if config.mask else config.mode, fps=env.fps
+        task=config.task, robot=config.robot, mode="" if config.mask else config.mode, fps=round(env.fps)
     )
     checkpoints = [read_checkpoint(Path(folder).expanduser(), asked) for folder in config.policy]
     members = [_planner(_fitting(checkpoint, config, env), env) for checkpoint in checkpoints]
