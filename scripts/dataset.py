@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from handrail.collect.commands.config import InspectConfig, PushConfig, RenderConfig, RepairConfig
-from handrail.collect.commands.tables import quality_table, summary_table, worst_table
+from handrail.collect.commands.tables import quality_table, summary_table, takeover_table, worst_table
 from handrail.collect.execution.pool import RENDERING, begin_loading
 from handrail.controllers.errors import FAILED, HandrailError
 from handrail.datasets.comparison.config import CompareConfig
@@ -31,6 +31,8 @@ def inspect(config: InspectConfig) -> int:
         console.print(f"Without them: {leave_out}")
         return 0
     console.print(summary_table(root))
+    if taken := takeover_table(root):
+        console.print(taken)
     if config.quality:
         console.print(quality_table(root))
     return 0

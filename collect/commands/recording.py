@@ -160,7 +160,7 @@ def session_columns(config: RecordConfig) -> dict[str, Scalar]:
 
 def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     """Return the writer of a recording's dataset, new or resumed."""
-    dataset, features = config.dataset, session_features(env)
+    dataset, features = config.dataset, session_features(env, bool(config.policy))
     manifest = Manifest(
         dataset.name, dataset.fps, env.model.description.name, features, versions(*SIMULATION)
     )

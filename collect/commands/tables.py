@@ -3,11 +3,17 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import number
+from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.summary import CHATTERING, UNKNOWN, summarize
+from handrail.datasets.quality.takeover import TAKE_OVER
 from handrail.datasets.quality.worst import Ranked
+from handrail.datasets.reading.load import recorded_episodes
+from handrail.datasets.recording.frames import INTERVENTION
 
 _QUALITY = ("episode", "mode", "length [s]", "smoothness")
 
@@ -37,6 +43,21 @@ def quality_table(root: Path) -> Table:
     hands = [name for name in rows[0] if name.startswith("smoothness,")] if rows else []
     headings = (*_QUALITY, *hands, *CHATTERING)
     return Table(headings, [[row[name] for name in headings] for row in rows], caption=caption)
+
+
+def takeover_table(root: Path) -> Table | None:
+    """Return a table of how often, for how long and what a person took over; None where no policy drove."""
+    episodes = recorded_episodes(root)
+    if not episodes or INTERVENTION not in episodes[0].info.features:
+        return None
+    found = measure({"": episodes}, np.random.default_rng(0), metrics=TAKE_OVER).values
+    units = {each.name: f" [{each.unit}]" if each.unit else "" for each in TAKE_OVER}
+    rows = [
+        [str(episode.number), *(number(found[each.name][""].values[place]) for each in TAKE_OVER)]
+        for place, episode in enumerate(episodes)
+    ]
+    means = ["mean", *(number(found[each.name][""].estimate) for each in TAKE_OVER)]
+    return Table(("episode", *(each.title + units[each.name] for each in TAKE_OVER)), [*rows, means])
 
 
 def worst_table(root: Path, metric: Metric, worst: Sequence[Ranked]) -> Table:

@@ -153,12 +153,17 @@ def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode
     fit = fitting(MODES, len(env.model.description.hands))
     modes = [build_mode(replace(config, mode=name, mask=""), env.model) for name in fit]
     channels, hand = Channels.of(env.model.description), env.model.hand.name
-    known = [mode for mode in modes if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))]
+    known = [
+        mode
+        for mode in modes
+        if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))
+        and CONTROLLERS.find(mode.controller).fits(env.model.description)
+    ]
     return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
 
 
-def session_features(env: HandrailEnv) -> dict[str, Feature]:
-    """Return the dataset's columns of an environment."""
+def session_features(env: HandrailEnv, shared: bool = False) -> dict[str, Feature]:
+    """Return the dataset's columns of an environment; `shared` where a policy steers beside the person."""
     return frame_features(
         state=env.agent_names,
         environment=env.state_names,
@@ -167,4 +172,5 @@ def session_features(env: HandrailEnv) -> dict[str, Feature]:
         cameras=env.cameras,
         image_size=env.image_size,
         grippers=[hand.named("gripper") for hand in env.model.description.hands],
+        shared=shared,
     )

@@ -10,7 +10,7 @@ step(intent) ─▶ controller ─ command ─▶ env.step ─▶ robot.send ─
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import Pose
 from handrail.datasets.recording.frames import Frame
 
 ROUNDING = 1e-9  # of times [s]
@@ -35,6 +36,14 @@ class Disturbance(Protocol):
 
     def act(self) -> None:
         """Act during the period that begins now."""
+
+
+@runtime_checkable
+class Aiming(Protocol):
+    """A controller that takes where the hand is to be brought."""
+
+    def aim(self, goal: Pose) -> None:
+        """Say where, before an update."""
 
 
 @dataclass
@@ -200,11 +209,22 @@ class EpisodeLoop:
             before, now.holding = now.holding, self._holds
             if self.env.start.scene.movers or now.holding or before:
                 self._controller.update_scene(self.env.plant.obstacles())
+            if isinstance(self._controller, Aiming) and (goal := self._goal):
+                self._controller.aim(goal)
             now.command = self._controller.update(now.view.state, intent)
             now.asked, now.due = step, now.due + self.control_period
             self.tally.updated(now.command)
         time = (step + 1 - now.asked) * self.env.period
         return np.concatenate((now.command.velocity(time), now.command.grippers))
+
+    @property
+    def _goal(self) -> Pose | None:
+        """Where the hand is to be brought, if the task says that and somebody sees it."""
+        state = self.now.view.task
+        aim = None if self.env.real else self.env.task.aim(state)
+        if aim is None:
+            return None
+        return Pose(aim.position, state.tool.rotation if aim.rotation is None else aim.rotation)
 
     @property
     def _holds(self) -> bool:

@@ -9,7 +9,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 
@@ -56,6 +56,11 @@ class ModeController:
         if self._controller is not before:
             self._controller.reset(self._obstacles)
         return self._controller.update(state, intent)
+
+    def aim(self, goal: Pose) -> None:
+        """Say where the hand is to be brought now, to a controller that takes that."""
+        if hasattr(self._controller, "aim"):
+            self._controller.aim(goal)  # pyright: ignore[reportAttributeAccessIssue]
 
     @property
     def _controller(self) -> Controller:

@@ -89,7 +89,7 @@ class Recorder:
             frame = self._undoable.pop(0)
             if self._aside and not frame.images:
                 frame = self._aside.take(frame)
-            self.writer.add_frame(frame_row(frame), self._task)
+            self.writer.add_frame(frame_row(frame, self.writer.features), self._task)
 
     def _close(self) -> None:
         if self._aside:

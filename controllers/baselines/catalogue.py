@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from handrail.controllers.registry import Registry
+from handrail.controllers.registry import Registry, resolved
 
 
 @dataclass(frozen=True)
@@ -15,16 +15,20 @@ class ControllerSpec:
     build: Callable[..., Any] | str  # `(model, period [s]) -> Controller`, or where that is, `module:name`
     help: str  # what becomes of the command, in one line
     protects: bool = False  # whether it keeps more than the joints' limits
+    fits: Callable[[Any], bool] = lambda robot: True  # whether it can drive a robot, by its description
     objectives: bool = False
     """Whether `build` also takes what robot and task bring, `(model, period, objectives)`."""
 
 
-def _masked_mpc(model: Any, period: float, objectives: tuple[Any, ...]) -> Any:
-    from handrail.controllers.mpc.masked_mpc import MaskedMpc
+def _mpc(kind: str) -> Callable[..., Any]:
+    """Return what builds a kind of the masked MPC, `module:name`."""
 
-    mpc = MaskedMpc(model, objectives=objectives)
-    mpc.settings.check_period(period, "control rate [Hz]")
-    return mpc
+    def build(model: Any, period: float, objectives: tuple[Any, ...]) -> Any:
+        mpc = resolved(f"{_HERE}.mpc.{kind}")(model, objectives=objectives)
+        mpc.settings.check_period(period, "control rate [Hz]")
+        return mpc
+
+    return build
 
 
 _HERE = "handrail.controllers"
@@ -32,7 +36,14 @@ CONTROLLERS = Registry(
     "controller",
     ControllerSpec,
     (
-        ControllerSpec("mpc", _masked_mpc, "the masked MPC", protects=True, objectives=True),
+        ControllerSpec("mpc", _mpc("masked_mpc:MaskedMpc"), "the masked MPC", protects=True, objectives=True),
+        ControllerSpec(
+            "blended",
+            _mpc("blended:BlendedMpc"),
+            "the masked MPC of an operator and an actor that knows the goal",
+            protects=True,
+            objectives=True,
+        ),
         ControllerSpec("direct", f"{_HERE}.baselines.direct:DirectController", "clipped to joint limits"),
         ControllerSpec(
             "dls",

@@ -6,8 +6,10 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.reactive import ReactiveController
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.robot.model import RobotModel
 
 ALPHA = 1.0
@@ -20,6 +22,7 @@ MARGIN = 0.10  # signed distance kept between shapes, at scale 1 [m]
 _WORK_MARGIN = 0.008  # the same between tool shapes and work surfaces [m]
 _ACTIVATION_DISTANCE = 2.0  # beyond the margin, at which a pair gets a row [m]
 _SLACK = 1e4  # linear penalty of the slack of the rows, per m/s; and the quadratic one
+_DAMPING = 0.01  # λ, as of damped least squares
 _INFINITE = 1e30
 
 
@@ -29,7 +32,8 @@ class CbfFilter(ReactiveController):
     `min ‖u - u_cmd‖²_W + ρ₁ s + ½ ρ₂ s²  s.t.  ∇d·u + ∂d/∂t ≥ -α (d - margin) - s` for every near pair, with
     u within the limits of velocity and acceleration and able to brake before the position limits, and
     W = diag(1 / v_max²). It looks one step ahead: at high speed the acceleration limit can leave it without
-    a solution, and then s > 0. Joints that nobody commands are asked to rest.
+    a solution, and then s > 0. Joints that nobody commands are asked to rest. Of other channels,
+    `‖M (C u - û)‖² + λ ‖u‖²_W` stands in place of the first term: what they leave open is as small as can be.
 
     Args:
         model: of the robot.
@@ -42,11 +46,10 @@ class CbfFilter(ReactiveController):
 
     def _filtered(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         """Return the nearest velocity that is allowed, (n,)."""
-        joints, fastest = self.channels.joint_slice, self._model.description.limits.velocity
-        asked = np.clip(np.where(intent.mask[joints], intent.values[joints], 0.0), -fastest, fastest)
+        fastest = self._model.description.limits.velocity
         gradients, allowed = self._barriers(state.q)
-        weights = fastest**-2.0
-        hessian, gradient = np.diag(np.append(weights, _SLACK)), np.append(-weights * asked, _SLACK)
+        hessian, gradient = np.diag(np.append(fastest**-2.0, _SLACK)), np.append(-fastest, _SLACK)
+        hessian[:-1, :-1], gradient[:-1] = self._tracking(state.q, intent, fastest)
         matrix = np.hstack([gradients, np.ones((len(allowed), 1))])
         lower, upper = (
             self._limiter.limit(previous, bound, self._period, state.q)[0] for bound in (-fastest, fastest)
@@ -58,6 +61,19 @@ class CbfFilter(ReactiveController):
             raise HandrailError(f"CBF filter: DAQP found no solution (exit flag {flag})")
         self.slack = max(float(solution[-1]), 0.0)
         return solution[:-1]
+
+    def _tracking(self, q: FloatArray, intent: Intent, fastest: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return hessian (n, n) and gradient (n,) of how far a velocity is from what is asked for."""
+        joints, weights = self.channels.joint_slice, fastest**-2.0
+        others = np.flatnonzero(intent.mask[: joints.start])
+        if not len(others):
+            asked = np.clip(np.where(intent.mask[joints], intent.values[joints], 0.0), -fastest, fastest)
+            return np.diag(weights), -weights * asked
+        usual = in_usual_frames(intent, self._model, q)
+        if usual is None:
+            raise HandrailError("CBF filter: expected all axes of a turned frame, got some of them")
+        matrix = channel_matrix(self._model, self.channels, q)[usual.mask]
+        return matrix.T @ matrix + _DAMPING * np.diag(weights), -matrix.T @ usual.values[usual.mask]
 
     def _barriers(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return rows `gradients u ≥ lower` of the R near pairs at q, (R, n) and (R,).

@@ -14,7 +14,10 @@ from handrail.datasets.editing.source import EditSource, opened
 from handrail.datasets.format.episode_rows import row_files
 from handrail.datasets.format.info_file import Encodings
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import ColumnTypes
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.recording.frames import shared_features
 from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import explained
@@ -54,10 +57,12 @@ def copy_episodes(
         in_place: Whether it replaces one of the sources.
         types: Of the extra columns, where they are not those of all sources.
     """
-    first = sources[0]
+    first, found = sources[0], (shared_features(source.manifest.features) for source in sources)
+    shared = next(filter(None, found), {})  # a demonstration has them, too, once it lies beside a take-over
+    manifest = _with(shared, first.manifest)
     for other in sources[1:]:
-        other.manifest.check_fits(first.manifest, _refused(other, first))
-    manifest = replace(first.manifest, repo_id=name or first.manifest.repo_id)
+        _with(shared, other.manifest).check_fits(manifest, _refused(other, first))
+    manifest = replace(manifest, repo_id=name or first.manifest.repo_id)
     manifest.check()
     if slices is None:
         slices = chain.from_iterable(source.slices() for source in sources)
@@ -107,6 +112,12 @@ def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]
         elif not kept:
             remove_whole(root)
         return len(source.rows) - len(kept)
+
+
+def _with(shared: Mapping[str, Feature], manifest: Manifest) -> Manifest:
+    """Return a schema with those shared columns that it lacks."""
+    lacking = {name: each for name, each in shared.items() if name not in manifest.features}
+    return replace(manifest, features={**manifest.features, **lacking})
 
 
 def _is_empty(root: Path) -> bool:

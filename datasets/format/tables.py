@@ -87,6 +87,13 @@ def stored_features(features: Mapping[str, Feature]) -> dict[str, Feature]:
     return {key: feature for key, feature in features.items() if not feature.is_video} | AUTOMATIC
 
 
+def column_array(values: Any, kind: pa.DataType) -> pa.Array:
+    """Return a column, `(N,)` or `(N, d)`, or N strings, as an Arrow array of a data file's type."""
+    if pa.types.is_fixed_size_list(kind):
+        return pa.FixedSizeListArray.from_arrays(numbers(np.reshape(values, -1), kind.value_type), type=kind)
+    return scalars(values, kind) if kind == pa.string() else numbers(values, kind)
+
+
 def data_schema(features: Mapping[str, Feature]) -> pa.Schema:
     """Return the columns of the data files, with what Hugging Face's `datasets` reads."""
     fields, described = [], {}
@@ -109,16 +116,7 @@ def data_bytes(features: Mapping[str, Feature], columns: Mapping[str, Any]) -> b
         columns: For each stored feature `(N,)` or `(N, d)` values, or a list of N strings.
     """
     schema = data_schema(features)
-    arrays = []
-    for field in schema:
-        values = columns[field.name]
-        if pa.types.is_fixed_size_list(field.type):
-            flat = numbers(np.reshape(values, -1), field.type.value_type)
-            arrays.append(pa.FixedSizeListArray.from_arrays(flat, type=field.type))
-        else:
-            arrays.append(
-                scalars(values, field.type) if field.type == pa.string() else numbers(values, field.type)
-            )
+    arrays = [column_array(columns[field.name], field.type) for field in schema]
     return parquet_bytes(pa.Table.from_arrays(arrays, schema=schema))
 
 

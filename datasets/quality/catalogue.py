@@ -7,9 +7,9 @@ policy, and five of seven metrics exploited the length of the episodes: look at 
 """
 
 from handrail.controllers.registry import Registry
-from handrail.datasets.quality import consistency, effort, motion, safety, tracking
+from handrail.datasets.quality import consistency, effort, motion, safety, takeover, tracking
 from handrail.datasets.quality.metric import Metric
 
-_MODULES = (motion, consistency, tracking, safety, effort)
+_MODULES = (motion, consistency, tracking, safety, effort, takeover)
 _OURS = (each for module in _MODULES for each in vars(module).values() if isinstance(each, Metric))
 METRICS = tuple(Registry("metric", Metric, _OURS).values())

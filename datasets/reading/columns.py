@@ -35,6 +35,10 @@ class ColumnNames:
     """From what the device's screen showed to the answer [s]."""
     undos: Names = "teleop.undos"
     """How often the operator has gone back in the episode so far."""
+    owner: Names = "owner"
+    """Who commands each channel beside a policy: 0 nobody, 1 the policy, 2 the person, 3 both."""
+    intervention: Names = "intervention"
+    """Whether the person owned something beside a policy."""
     slack: Names = "controller.slack"
     """Largest violation of a soft limit in the plan."""
 

@@ -2,15 +2,16 @@
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
 from handrail.controllers.interface.command import Diagnostics
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import LONG_AGO, Intent
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.datasets.format.schema import Feature
 
@@ -84,6 +85,16 @@ COLUMNS = (
 Policies read `observation.*` and write `action`; LeRobot leaves the rest alone.
 All numbers are finite: no tool's statistics may become NaN.
 """
+BY_POLICY, BY_PERSON = 1, 2
+"""What `owner` has added up of whoever commands a channel or a gripper; 0 of what the MPC completes alone."""
+OWNER, INTERVENTION, MASK = "owner", "intervention", "teleop.mask"
+SHARED_COLUMNS = (
+    Column(OWNER, "int64", lambda frame: _owners(frame.intent), "asked"),
+    Column(INTERVENTION, "bool", lambda frame: bool(np.any(_owners(frame.intent) >= BY_PERSON))),
+    Column("policy.values", "float32", lambda frame: _wanted(frame.intent), "asked"),
+    Column("policy.age", "float32", lambda frame: _finite_number(_of_policy(frame.intent).raw.age)),
+)
+"""What is recorded besides where a policy steers beside a person."""
 PICTURE = "observation.images."
 
 
@@ -95,6 +106,7 @@ def frame_features(
     cameras: Sequence[str] = (),
     image_size: tuple[int, int] = (128, 128),
     grippers: Sequence[str] = ("gripper",),
+    shared: bool = False,
 ) -> dict[str, Feature]:
     """Return the columns of a robot, a task and its cameras.
 
@@ -106,6 +118,7 @@ def frame_features(
         cameras: names of the cameras.
         image_size: height and width [pixels].
         grippers: names of those of the hands.
+        shared: whether a policy steers beside the person.
     """
     names = {
         "state": tuple(state),
@@ -114,9 +127,10 @@ def frame_features(
         "channels": tuple(channels),
         "asked": (*channels, *grippers),
     }
-    features = {column.name: Feature(column.dtype) for column in COLUMNS} | {
+    columns = COLUMNS + SHARED_COLUMNS * shared
+    features = {column.name: Feature(column.dtype) for column in columns} | {
         column.name: Feature(column.dtype, (len(names[column.parts]),), names[column.parts])
-        for column in COLUMNS
+        for column in columns
         if column.parts
     }
     observed = {name: each for name, each in features.items() if name.startswith("observation.")}
@@ -124,10 +138,27 @@ def frame_features(
     return observed | pictures | features
 
 
-def frame_row(frame: Frame) -> dict[str, Any]:
-    """Return a moment as a frame of `frame_features`."""
+def frame_row(frame: Frame, features: Container[str] = ()) -> dict[str, Any]:
+    """Return a moment as a frame of `frame_features`, with those shared columns that the features have."""
     pictures = {PICTURE + name: image for name, image in frame.images.items()}
-    return {column.name: column.value(frame) for column in COLUMNS} | pictures
+    columns = (*COLUMNS, *(column for column in SHARED_COLUMNS if column.name in features))
+    return {column.name: column.value(frame) for column in columns} | pictures
+
+
+def shared_features(features: Mapping[str, Feature]) -> dict[str, Feature]:
+    """Return the columns of a dataset that are there because a policy steered beside the person."""
+    names = [column.name for column in SHARED_COLUMNS]
+    return {name: features[name] for name in names} if {MASK, *names} <= set(features) else {}
+
+
+def of_demonstration(mask: BoolArray) -> dict[str, np.ndarray]:
+    """Return the shared columns of frames without a policy: whoever drove owns their mask, (N, m + h)."""
+    return {
+        OWNER: BY_PERSON * mask.astype(np.int64),
+        INTERVENTION: np.zeros(len(mask), bool),
+        "policy.values": np.zeros(mask.shape, np.float32),
+        "policy.age": np.zeros(len(mask), np.float32),
+    }
 
 
 def _asked(intent: Intent) -> FloatArray:
@@ -136,6 +167,32 @@ def _asked(intent: Intent) -> FloatArray:
 
 def _owned(intent: Intent) -> BoolArray:
     return np.concatenate((intent.mask, np.ones(len(intent.grippers), dtype=bool)))
+
+
+def _owners(intent: Intent) -> IntArray:
+    """Return who commands each channel and gripper, (m + h,); nobody while nobody is listened to."""
+    hands = len(intent.grippers)
+    owners = np.zeros(len(intent.mask) + hands, np.int64)
+    if intent.time <= LONG_AGO:
+        return owners
+    if not isinstance(intent, Intents):  # the person alone
+        return owners + BY_PERSON * _owned(intent)
+    for name, number in ((POLICY, BY_POLICY), (PERSON, BY_PERSON)):
+        if source := intent.source(name):
+            grippers = [name in intent.of_grippers[hand : hand + 1] for hand in range(hands)]
+            owners += number * np.concatenate((intent.mask & (source.share() > 0.0), grippers))
+    return owners
+
+
+def _of_policy(intent: Intent) -> Intent:
+    """Return what the policy wants; nothing, on no channel, without a usable answer that is listened to."""
+    source = intent.source(POLICY) if isinstance(intent, Intents) and intent.time > LONG_AGO else None
+    nothing = Intent(np.zeros(len(intent.mask)), np.zeros(len(intent.mask), bool))
+    return (source.intent if source else nothing).of_hands(len(intent.grippers))
+
+
+def _wanted(intent: Intent) -> FloatArray:
+    return _asked(_of_policy(intent))
 
 
 def _raw(intent: Intent) -> FloatArray:

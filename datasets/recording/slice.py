@@ -1,6 +1,6 @@
 """A stretch of an episode on its way into a dataset: rows, pictures, and what is said of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,7 +14,8 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, Scalar, Totals
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.stats import Stats, column_stats
-from handrail.datasets.format.tables import column_values, numbers
+from handrail.datasets.format.tables import column_array, column_values, numbers
+from handrail.datasets.recording.frames import MASK, of_demonstration
 
 TRIMMED = "trimmed_start"  # episode column: how many frames were cut off at the beginning
 _SUCCESS, _DONE = "next.success", "next.done"
@@ -75,7 +76,8 @@ class EpisodeSlice:
         whole = files.open(self.data).rows(self.record.episode, self.record.length)
         if whole.num_rows != self.record.length:
             raise ValueError(f"{self.data}: {whole.num_rows} rows instead of {self.record.length}")
-        whole = whole.select(schema.names).cast(schema)
+        lacking = [field for field in schema if field.name not in whole.schema.names]
+        whole = _demonstrated(whole, lacking).select(schema.names).cast(schema)
         table = whole.slice(self.first, self.length)
         tasks, values = self._tasks(whole, totals)
         frames = np.arange(self.length)
@@ -92,7 +94,7 @@ class EpisodeSlice:
             table = table.set_column(
                 place, schema.field(place), numbers(values[name], schema.field(place).type)
             )
-        anew = [field for field in schema if self.is_cut or field.name in values]
+        anew = [field for field in schema if self.is_cut or field.name in values or field in lacking]
         texts = pa.string()
         stats = {
             each.name: column_stats(column_values(table, each.name)) for each in anew if each.type != texts
@@ -111,3 +113,12 @@ class EpisodeSlice:
         tasks = tuple(dict.fromkeys(said))
         everything = totals.with_tasks(tasks)
         return tasks, {"task_index": np.array([everything.index(sentence) for sentence in said])}
+
+
+def _demonstrated(table: pa.Table, lacking: Sequence[pa.Field]) -> pa.Table:
+    """Return the rows of an episode without a policy with the shared columns that they lack."""
+    if lacking:
+        values = of_demonstration(column_values(table, MASK))
+        for field in lacking:
+            table = table.append_column(field, column_array(values[field.name], field.type))
+    return table

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.quality import effort, motion, safety, tracking
+from handrail.datasets.quality import effort, motion, safety, takeover, tracking
 from handrail.datasets.quality.consistency import entropy, mutual_information, neighbour_variance
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
@@ -219,6 +219,34 @@ def test_mode_switches():
     assert value(effort.mode_switches, mode=mode, owned=owned) == 3.0
 
 
+def test_take_overs():
+    """Golden at 10 Hz over 1.2 s: two take-overs of 0.3 s and 0.1 s, a third of 0.2 s to the end."""
+    taken = np.array([0, 1, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1], bool)
+    assert value(takeover.interventions, intervention=taken) == 3.0
+    assert value(takeover.intervention_rate, intervention=taken) == pytest.approx(3 / 1.2 * 60)
+    assert value(takeover.intervention_length, intervention=taken) == pytest.approx(0.2)
+    assert value(takeover.intervention_share, intervention=taken) == pytest.approx(0.5)
+    assert value(takeover.interventions, intervention=~taken) == 3.0
+
+
+def test_what_was_taken_over():
+    """Of the base, a hand, the pair, two joints, a gripper; in the last frame a demonstration."""
+    names = ("base.vx", "left.vx", "pair.vx", "joint.a", "joint.b", "right.gripper")
+    rows = [
+        [2, 1, 0, 0, 0, 1],
+        [0, 2, 1, 3, 0, 1],
+        [0, 1, 3, 0, 2, 1],
+        [0, 1, 0, 0, 2, 2],
+        [2, 2, 2, 2, 2, 2],
+    ]
+    taken, owners = np.array([1, 1, 1, 1, 0], bool), np.array(rows)
+    features = {"owner": Feature("int64", (6,), names), "intervention": Feature("bool")}
+    info = DatasetInfo(Path("one"), 10, "arm", features, 1, 1, "", "", from_handrail=True)
+    episode = Demonstration(0, info, {"owner": owners, "intervention": taken}, {"length": 5})
+    shares = [metric.measure(episode, None) for metric in takeover.TAKE_OVER[-3:]]
+    assert shares == pytest.approx([1 / 5, 3 / 5, 3 / 5])
+
+
 ROWS = rng().normal(size=(40, 2))
 BUTTONS = np.array([[0.0], [1.0]] * 9)
 REFUSED = [
@@ -239,6 +267,8 @@ REFUSED = [
     ),
     (lambda: value(effort.undos, device=np.array([""] * 3), undos=np.arange(3)), "nobody held a device"),
     (lambda: value(effort.mode_switches, state=ROWS), "no column of the mode"),
+    (lambda: value(takeover.intervention_length, intervention=np.zeros(3, bool)), "nobody took over"),
+    (lambda: value(takeover.intervention_share, state=ROWS), "no column 'intervention'"),
 ]
 
 

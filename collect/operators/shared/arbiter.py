@@ -10,7 +10,6 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 
-PERSON, POLICY = "person", "policy"  # names of the sources
 _MOVED = 1e-3  # of a commanded velocity: less is a hand that rests on its stick [m/s, rad/s]
 
 

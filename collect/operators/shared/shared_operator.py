@@ -15,15 +15,15 @@ from dataclasses import replace
 import numpy as np
 
 from handrail.collect.operators.operator import EpisodeEvent, Operator, View
-from handrail.collect.operators.shared.arbiter import PERSON, POLICY, Arbiter, Groups, Wishes
+from handrail.collect.operators.shared.arbiter import Arbiter, Groups, Wishes
 from handrail.collect.operators.shared.by_input import HANDBACK
-from handrail.collect.operators.shared.frames import in_usual_frames
 from handrail.collect.operators.shared.planning import Planner
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import LONG_AGO, Intent
-from handrail.controllers.interface.sources import Intents, Preview, Source
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Preview, Source
+from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.robot.model import RobotModel
 
 

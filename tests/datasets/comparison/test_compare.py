@@ -17,6 +17,7 @@ from handrail.datasets.comparison.headline import cautions, headline
 from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
+from handrail.datasets.quality.takeover import TAKE_OVER
 from handrail.datasets.reading.load import read_demonstrations
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
@@ -76,7 +77,7 @@ def test_two_datasets_that_handrail_did_not_make(foreign_report):
     applies = {name for name, groups in metrics.items() if groups["calm"]["estimate"] is not None}
     never = {"contacts", "impulse", "smallest_distance", "time_within_margin", "slack_used", "input_effort"}
     never |= {"input_reversals", "active_axes", "mode_switches", "input_idle"}
-    never |= {"undos", "input_age", "round_trip"}
+    never |= {"undos", "input_age", "round_trip", *(metric.name for metric in TAKE_OVER)}
     assert applies == {metric.name for metric in METRICS} - never
     for name in never:
         assert metrics[name]["shaky"]["does_not_apply"].startswith("no column")

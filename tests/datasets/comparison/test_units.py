@@ -13,6 +13,7 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
+from handrail.datasets.quality.takeover import TAKE_OVER
 from handrail.datasets.quality.units import why_not
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
@@ -21,7 +22,7 @@ NAMES = ("a.pos", "b.pos", "c.pos")
 ARM = DatasetInfo(Path("one"), 20, "arm", {}, 6, 240, "", "", from_handrail=False)
 OURS = replace(ARM, robot_type="ridgeback", from_handrail=True)
 ABSOLUTE = {"length", "smallest_distance", "contacts", "impulse", "time_within_margin", "mode_switches"}
-ABSOLUTE |= {"undos", "input_age", "round_trip"}
+ABSOLUTE |= {"undos", "input_age", "round_trip", *(metric.name for metric in TAKE_OVER)}
 
 
 def group(source=ARM, names=NAMES, scale=1.0, fps=20, action=1.0, mode="", seed=0):
