@@ -6,7 +6,7 @@ with the episode.
 
 import numpy as np
 
-from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.arrays import BoolArray, IntArray
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
@@ -71,7 +71,7 @@ def _taken(episode: Demonstration) -> BoolArray:
     return episode.numbers("intervention")[:, 0] > 0.0
 
 
-def _lengths(episode: Demonstration) -> FloatArray:
+def _lengths(episode: Demonstration) -> IntArray:
     """Return the lengths of the interventions [frames]."""
     edges = np.diff(_taken(episode).astype(int), prepend=0, append=0)
     return np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)

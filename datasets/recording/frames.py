@@ -186,8 +186,7 @@ def _owners(intent: Intent) -> IntArray:
 
 def _of_policy(intent: Intent) -> Intent:
     """Return what the policy wants; nothing, on no channel, without a usable answer that is listened to."""
-    known = isinstance(intent, Intents) and intent.time > LONG_AGO
-    source = intent.source(POLICY) if known else None
+    source = intent.source(POLICY) if isinstance(intent, Intents) and intent.time > LONG_AGO else None
     nothing = Intent(np.zeros(len(intent.mask)), np.zeros(len(intent.mask), bool))
     return (source.intent if source else nothing).of_hands(len(intent.grippers))
 

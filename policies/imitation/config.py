@@ -50,6 +50,11 @@ class TrainConfig:
     """Only what fits into so much of the operator's time, failed attempts included [min]; 0 for all."""
     draw: Advanced[Count] = 0
     """Seed of the order in which episodes are drawn; more episodes or minutes only add to the fewer."""
+    corrections: Literal["all", "only", "weighted"] = "all"
+    """Where a person took over from a policy: learn from all frames, only from those that a person commanded,
+    or from all with the corrections drawn as often as everything else together."""
+    init: str = ""
+    """Begin with the weights of an earlier policy, from its folder; it has to read and write the same."""
     steps: Count = 0
     """Updates of the policy; 0 for the preset's. With --patience the most that there may be."""
     eval_split: Advanced[Annotated[float, Meta(ge=0, lt=1)]] = 0.0

@@ -15,9 +15,19 @@ from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.recording.frames import PICTURE
 from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.encoder import Encoder
+from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
 
 _AT_ONCE = 4  # moments: what a core has near it; more takes twice as long
+
+
+def check_fits(encoder: Encoder, interface: PolicyInterface) -> None:
+    """Check that an encoder reads and says what was recorded."""
+    reads = encoder.reads
+    for name in ("state_names", "environment_names", "channels"):
+        if getattr(reads.interface, name) != getattr(interface, name):
+            words = f"expected one for the dataset's robot and task, got one for {reads.robot}, {reads.task}"
+            raise HandrailError(f"--encoder: {words}: other {name.replace('_', ' ')}")
 
 
 def tellable(environment: FloatArray, encoder: Encoder) -> FloatArray:

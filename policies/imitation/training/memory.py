@@ -6,6 +6,7 @@ The tensors are the same.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,8 @@ import torch
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.reading.reader import DatasetInfo
+from handrail.policies.imitation.interface.interface import ACTION
+from handrail.policies.imitation.training.corrections import Draws
 
 if TYPE_CHECKING:
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -63,14 +66,20 @@ class MemoryDataset:
     """All that are not pictures, (N, …) each, `frame_index` and `episode_index` among them."""
     tasks: Sequence[str]
     """The task sentence of each episode."""
+    draws: Draws
+    """Which frames samples begin with, and where their actions end."""
     windows: Mapping[str, Sequence[int]] = field(default_factory=dict)
-    """By key the offsets [frames] of its window; beyond an episode's ends its first or last frame is
-    repeated, and `KEY_is_pad` says so."""
+    """By key the offsets [frames] of its window; beyond an episode's ends (for actions, those of `draws`) its
+    first or last frame is repeated, and `KEY_is_pad` says so."""
     pictures: "LeRobotDataset | None" = None
     """LeRobot's reader of the same episodes, for the pictures alone."""
 
     def __len__(self) -> int:
         return sum(self.meta.lengths)
+
+    @cached_property
+    def _ends(self) -> torch.Tensor:
+        return torch.from_numpy(np.stack(self.draws.ends))
 
     def batch(self, indices: Sequence[int]) -> dict[str, Any]:
         """Return samples (B,), each column stacked, (B, …) or (B, W, …)."""
@@ -87,7 +96,8 @@ class MemoryDataset:
         for key, values in self.columns.items():
             if key in self.windows:
                 places = rows[:, None] + torch.tensor(list(self.windows[key]))
-                inside = places.clamp(first[:, None], last[:, None])
+                low, high = self._ends[:, rows] if key == ACTION else (first, last)
+                inside = places.clamp(low[:, None], high[:, None])
                 batch[key], batch[f"{key}_is_pad"] = values[inside], places != inside
             else:
                 batch[key] = values[rows]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 _REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
+_SINCE = {"corrections": "all", "init": ""}  # settings of which older checkpoints do not say, and did so
 _ENSEMBLE = "temporal_ensemble_coeff"
 ACT_CPU: dict[str, Any] = {
     "chunk_size": 20,
@@ -114,7 +115,7 @@ def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
     if sizes.steps < least:
         raise HandrailError(f"--resume with --steps {sizes.steps}: expected {least} or more, as it began")
     now = {f"--{name}": value for name, value in as_json(config).items() if name not in FREE_ON_RESUME}
-    then = {f"--{name}": value for name, value in began.training.items()}
+    then = {f"--{name}": value for name, value in (_SINCE | dict(began.training)).items()}
     for each, found in ((sizes, now), (began.sizes, then)):
         found |= {f"the preset's {name}": getattr(each, name) for name in ("lr", "cosine", "batch_size")}
         found |= {f"the policy's {name}": value for name, value in sorted(as_json(each)["options"].items())}

@@ -59,6 +59,7 @@ class TrainingRun:
         plateau: ends the training where the loss on held-out episodes is flat, and says how the learning rate
             goes; None makes all updates, by the settings' schedule.
         encoder: that reads pictures for the policy when it drives.
+        earlier: the policy whose weights and normalisation one that begins has; None for weights of its own.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class TrainingRun:
         checkpoint: Path | None,
         plateau: Plateau | None,
         encoder: Encoder | None = None,
+        earlier: Path | None = None,
     ) -> None:
         described = settings.policy
         assert described is not None
@@ -77,7 +79,7 @@ class TrainingRun:
         self._folder, self._sums = settings.output_dir, read_sums(checkpoint)
         self._accelerator = _accelerator(described)
         set_seed(settings.seed, self._accelerator)  # pyright: ignore[reportArgumentType]
-        place = None if checkpoint is None else checkpoint / MODEL
+        place = earlier if checkpoint is None else checkpoint / MODEL
         if place is not None:
             described.pretrained_path = place
         stats: Any = learnt.meta.stats
@@ -167,8 +169,9 @@ class TrainingRun:
 
     def _loss_on(self, held_out: MemoryDataset) -> float:
         """Return the loss on episodes, the same in every process; what is random goes on as before."""
-        policy, count = self._accelerator.unwrap_model(self._policy), len(held_out)
-        frames = np.unique(np.linspace(0, count - 1, min(count, _FRAMES)).round().astype(int)).tolist()
+        policy, drawn = self._accelerator.unwrap_model(self._policy), held_out.draws.frames()
+        places = np.linspace(0, len(drawn) - 1, min(len(drawn), _FRAMES)).round().astype(int)
+        frames = drawn[np.unique(places)].tolist()
         total, size, device = 0.0, self._settings.batch_size, self._accelerator.device
         policy.eval()
         with torch.random.fork_rng(), torch.no_grad(), self._accelerator.autocast():
@@ -196,14 +199,9 @@ class TrainingRun:
     def _batches(self, step: int) -> Iterator[Any]:
         """Yield batches for ever, from where a training that was cut off after a step goes on, to the bit."""
         settings, processes = self._settings, self._accelerator.num_processes
-        episodes = self._learnt.meta.episodes
-        sampler = EpisodeAwareSampler(
-            episodes["dataset_from_index"],
-            episodes["dataset_to_index"],
-            drop_n_last_frames=getattr(settings.policy, "drop_n_last_frames", 0),
-            shuffle=True,
-            seed=settings.seed or 0,
-        )
+        drawn = self._learnt.draws.frames(getattr(settings.policy, "drop_n_last_frames", 0))
+        each: Any = drawn, drawn + 1  # one by one, some of them several times
+        sampler = EpisodeAwareSampler(*each, shuffle=True, seed=settings.seed or 0)
         state = compute_sampler_state(step, len(sampler), settings.batch_size, processes)
         sampler.load_state_dict(state)
         order: Any = BatchSampler(sampler, settings.batch_size, drop_last=False)

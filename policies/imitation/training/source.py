@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -28,7 +28,9 @@ from handrail.policies.imitation.interface.interface import (
     STATE,
     PolicyInterface,
 )
-from handrail.policies.imitation.training.encoded import encoded, tellable
+from handrail.policies.imitation.training.corrections import Draws, corrected
+from handrail.policies.imitation.training.earlier import same_interface
+from handrail.policies.imitation.training.encoded import check_fits, encoded, tellable
 from handrail.policies.imitation.training.memory import (
     PICTURES,
     MemoryDataset,
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
 Columns = dict[str, np.ndarray]
 Features = dict[str, Feature]
 _LEARNT = ("observation", "action", "next.")
+_CORRECTED = "corrected"  # a column of whether a frame counts as a correction
 _NORMALISED = ("observation", "action")  # LeRobot rounds their statistics to the type that they come in
 _READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
 _READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
@@ -123,15 +126,20 @@ class TrainingSource:
             stats |= {key: picture_stats(pictures, key) for key in cameras}
         windows = {key: w for key, w in get_delta_indices(stamps, meta.fps).items() if key in self.columns}
         columns = {key: torch.from_numpy(np.ascontiguousarray(v)) for key, v in self.columns.items()}
-        return MemoryDataset(meta, columns, _sentences(rows), windows, pictures)
+        kind, marked = self.config.corrections, self.columns.get(_CORRECTED, np.zeros(sum(lengths), bool))
+        draws = Draws(kind, lengths, marked)
+        return MemoryDataset(meta, columns, _sentences(rows), draws, windows, pictures)
 
 
-def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> TrainingSource:
+def read_source(
+    config: TrainConfig, began: PolicyMeta | None = None, earlier: PolicyMeta | None = None
+) -> TrainingSource:
     """Read what a config asks for, or what a training began with.
 
     Args:
         config: what to train on.
         began: what the checkpoint says that the training goes on from.
+        earlier: what the policy says whose weights it began with.
     """
     root = config.dataset.folder
     check_whole(root, config.verify)
@@ -142,7 +150,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Trainin
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
     else:
-        interface, features, columns = _interpreted(info, selection, config, config.actions, encoder)
+        interface, features, columns = _interpreted(info, selection, config, config.actions, encoder, earlier)
     if config.images:
         if not (cameras := pictured(info)):
             raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
@@ -150,6 +158,8 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Trainin
     if not config.scene:
         features.pop(ENVIRONMENT, None)
         columns.pop(ENVIRONMENT, None)
+    if config.corrections != "all":
+        columns[_CORRECTED] = corrected(config.corrections, info, partial(_episodes, info, selection))
     columns |= _counters(selection.rows, info.fps)
     source = TrainingSource(config, info, selection, interface, features, encoder, columns)
     if began is not None and source.digest != began.data:
@@ -177,6 +187,7 @@ def _interpreted(
     config: TrainConfig,
     actions: Literal["realised", "intent"],
     encoder: Encoder | None,
+    earlier: PolicyMeta | None,
 ) -> tuple[PolicyInterface, Features, Columns]:
     """Return what a policy learns through an interface."""
     if actions == "intent":
@@ -190,6 +201,8 @@ def _interpreted(
         raise HandrailError(f"--actions {actions}: expected the columns of handrail-record, {words}")
     masks = _episodes(info, selection, [MASK])
     interface = PolicyInterface.of_dataset(features, masks, actions, config.base_pose)
+    if earlier:
+        interface = same_interface(config.init, earlier, interface, info.fps)
 
     def learnt(episode: Columns) -> Columns:
         state, environment = interface.observe(episode[STATE], episode[ENVIRONMENT])
@@ -197,21 +210,12 @@ def _interpreted(
 
     episodes = _episodes(info, selection, [key for key in COLUMNS if key in info.features])
     if encoder:
-        _check_fits(encoder, interface)
+        check_fits(encoder, interface)
         episodes = _encoded(info, selection, encoder, episodes)
     columns = _joined(map(learnt, episodes))
     names = zip(columns, (*interface.observation_names, interface.action_names), strict=True)
     features = {key: Feature("float32", (len(each),), each) for key, each in names if each}
     return interface, features, {key: columns[key] for key in features}
-
-
-def _check_fits(encoder: Encoder, interface: PolicyInterface) -> None:
-    """Check that an encoder reads and says what was recorded."""
-    reads = encoder.reads
-    for name in ("state_names", "environment_names", "channels"):
-        if getattr(reads.interface, name) != getattr(interface, name):
-            words = f"expected one for the dataset's robot and task, got one for {reads.robot}, {reads.task}"
-            raise HandrailError(f"--encoder: {words}: other {name.replace('_', ' ')}")
 
 
 def _encoded(

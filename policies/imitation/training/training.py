@@ -30,6 +30,7 @@ from handrail.policies.imitation.interface.checkpoint import (
 from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
+from handrail.policies.imitation.training.earlier import earlier_policy
 from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.imitation.training.presets import (
     check_settings,
@@ -53,9 +54,12 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
         quiet: show no progress.
     """
     config.check()
+    resumed = config.resume and last_checkpoint(config.folder)
+    earlier = earlier_policy(config) if config.init and not resumed else None
     checkpoint = _begin(config)
     began = None if checkpoint is None else _checked(config, checkpoint)
-    source, steps = read_source(config, began), resolved(config).steps
+    like = earlier[1] if earlier else began if config.init else None
+    source, steps = read_source(config, began, like), resolved(config).steps
     losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
     plateau, warmup = None, min(_WARMUP, steps // 10)
     if config.patience:
@@ -65,7 +69,8 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
             settings = _settings(config, steps, warmup)
             assert settings.policy is not None
             learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
-            training = TrainingRun(settings, learnt, checkpoint, plateau, source.encoder)
+            place = earlier and earlier[0]
+            training = TrainingRun(settings, learnt, checkpoint, plateau, source.encoder, place)
             measured = out[0] if out else None, losses, config.eval_steps
             training.train(lambda step: _meta(source, step, losses), *measured, quiet)
         checkpoint = last_checkpoint(config.folder)
