@@ -84,3 +84,8 @@ class Blend:
 def by_mask(groups: Groups, settings: object) -> ByMask:
     """Temporary."""
     return ByMask(groups)
+
+
+def whole(groups: Groups, settings: object) -> Whole:
+    """Temporary."""
+    return Whole(groups)
