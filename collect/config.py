@@ -227,8 +227,9 @@ class RecordConfig(SessionConfig, ExecutionConfig):
             words = "expected none of --moving_obstacles, --randomise, --no_physics"
             raise HandrailError(f"--robot_client {self.robot_client}: {words}")
         ARBITERS.check(self.arbiter)
-        if self.operator == "supervisor" and not self.policy:
-            raise HandrailError("--operator supervisor: expected --policy, the folder of one to supervise")
+        if self.operator in ("supervisor", "hand_supervisor") and not self.policy:
+            words = "expected --policy, the folder of one to supervise"
+            raise HandrailError(f"--operator {self.operator}: {words}")
         self._check_rates()
         self._check_sharing()
         for one, other in (("resume", "overwrite"), ("display_data", "display_web")):

@@ -40,6 +40,8 @@ ARBITERS = Registry(
         ArbiterSpec(
             "by_mask", "handrail.collect.operators.shared.by_input:by_mask", "what a person moves is theirs"
         ),
-        ArbiterSpec("whole", "handrail.collect.operators.shared.by_input:whole", "any input takes everything"),
+        ArbiterSpec(
+            "whole", "handrail.collect.operators.shared.by_input:whole", "any input takes everything"
+        ),
     ),
 )
