@@ -39,12 +39,12 @@ same_number = 1                 draws of which policies also learn from `episode
 [encoders]                      optional: policies look through these, one a task, when they drive: nobody
 reach = "ridgeback_ur10-reach"  tells them where things are
 
-[rounds]                        optional: a policy of the one mode is where all begin; then the same operator time is
-count = 2                       spent in several ways, so many times; each time a policy learns anew from all data
-sd = 0.1                        of its way so far, in `steps` updates. All policies write intents and drive alone.
-primary = [["whole", "more"]]   pairs of ways, compared after the last round, declared and tested; [] for none
+[rounds]                        optional: all begin with a policy of the one mode; then the same operator time
+count = 2                       is spent in several ways, in so many rounds; after each a policy learns anew
+primary = [["whole", "more"]]   pairs of ways, compared after the last round and tested; [] for none
+sd = 0.1                        from all data of its way so far. Policies write intents and drive alone.
 
-[rounds.ways.whole]             a way; its name. Attempts that do not fit into the time any more are left out
+[rounds.ways.whole]             a way, by its name; attempts that do not fit into the time are left out
 operator = "supervisor"         who records: scripted, or a supervisor of the policy of the round before
 arbiter = "whole"               who owns what while that policy drives; "" if none drives beside the operator
 corrections = "weighted"        how corrections are learnt from: all, only or weighted
@@ -157,7 +157,7 @@ class Rounds:
 
     def words(self, pair: tuple[str, str], number: int) -> str:
         """Return what two ways are compared in after a round."""
-        return f"{' − '.join(pair)}, round {number}"
+        return f"{' − '.join(pair)} after round {number}"
 
     @property
     def declared(self) -> dict[str, tuple[str, str]]:

@@ -13,7 +13,7 @@ from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.contrast import Contrast
-from handrail.policies.study.contrasts import CONTRASTS, DECLARED, EXPLORATORY, SYSTEM, WORDS
+from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS
 from handrail.policies.study.power import detectable
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
@@ -32,15 +32,8 @@ def of_contrasts(found: Sequence[Contrast], results: Results) -> list[Table]:
 
 def of_task(task: str, results: Results) -> list[Table]:
     """Return the tables of a task without empty ones."""
-    kinds = (
-        conditions_table,
-        failures_table,
-        collection_table,
-        effort_table,
-        quality_table,
-        treatments_table,
-    )
-    return [table for make in kinds if (table := make(task, results)).rows]
+    kinds = conditions_table, failures_table, collection_table, effort_table, quality_table
+    return [table for make in (*kinds, treatments_table) if (table := make(task, results)).rows]
 
 
 def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> Table:
