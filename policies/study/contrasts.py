@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 
@@ -44,10 +44,11 @@ def contrasts(results: Results) -> list[Contrast]:
 def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
     ask, factors = partial(_contrast, results, EXPLORATORY, tasks), design.factors
     if rounds := design.rounds:
-        for number, pair in product(range(1, rounds.count + 1), combinations(rounds.ways, 2)):
+        for number, pair in product(range(1, rounds.count + 1), rounds.pairs):
             if tasks != tuple(design.tasks) or rounds.words(pair, number) not in rounds.declared:
                 yield ask(*_after(rounds, pair, number))
-            yield ask(*_after(rounds, pair, number), "clean")
+            if number == rounds.count:
+                yield ask(*_after(rounds, pair, number), "clean")
         for number, way in product(range(1, rounds.count + 1), rounds.ways):
             yield ask(*_pair(f"{way}-{number} intent", f"{design.baseline} intent"))
         return

@@ -58,6 +58,7 @@ draws = 1                       the first so many
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Annotated, Literal
 
 from msgspec import Meta
@@ -160,6 +161,12 @@ class Rounds:
         return f"{' − '.join(pair)} after round {number}"
 
     @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """All pairs of ways, those that are tested as they are declared."""
+        found = combinations(self.ways, 2)
+        return [(two, one) if (two, one) in self.primary else (one, two) for one, two in found]
+
+    @property
     def declared(self) -> dict[str, tuple[str, str]]:
         """The pairs that are tested, by their words."""
         return {self.words(pair, self.count): pair for pair in self.primary}
@@ -227,7 +234,7 @@ class StudyDesign:
     def _check_rounds(self, rounds: Rounds) -> None:
         """Check that there are ways to compare, and nothing that rounds do not know of."""
         where = f"study {self.name}: rounds"
-        for other in ("factors", "beside", "encoders", "robustness"):
+        for other in ("flat", "factors", "beside", "encoders", "robustness"):
             if getattr(self, other):
                 raise HandrailError(f"{where}: expected no {other} beside them")
         for way in rounds.ways:

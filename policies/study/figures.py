@@ -31,9 +31,9 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     made: dict[str, Any] = {}
     if any(each.interval and each.family == DECLARED for each in found):
         made["contrasts"] = _contrasts(found)
-    if tasks and (rounds := results.progress.design.rounds):
-        made["rounds"] = _rounds(tasks, list(rounds.ways), results)
-    elif tasks:
+    if rounds := results.progress.design.rounds:
+        return made | ({"rounds": _rounds(tasks, list(rounds.ways), results)} if tasks else {})
+    if tasks:
         made["answer"] = _answer(tasks, results)
     if curved:
         made["training"] = _training(curved, results)
@@ -103,13 +103,13 @@ def _rounds(tasks: Sequence[str], ways: Sequence[str], results: Results) -> Any:
             minutes = sizes.minutes + rounds * sizes.round_minutes
             values = np.array([each.value.estimate for each in shown])
             errors = np.abs(np.array([each.value.interval for each in shown]).T - values) * 100
-            style = {"color": COLOURS[place], "marker": "o", "label": way.replace("_", " "), "lw": 1.4}
+            style = {"color": COLOURS[place], "marker": "o", "label": way, "lw": 1.4}
             shift = 0.02 * (place - 1) * sizes.round_minutes
             axes.errorbar(minutes + shift, 100 * values, yerr=errors, elinewidth=1.0, ms=4, **style)
         axes.set(xlabel="operator's time [min]", ylim=(-3, 103))
         tidy(axes, "y")
     figure.axes[0].set_ylabel("policy success [%], 95 %")
-    figure.axes[0].legend(fontsize=8, frameon=False)
+    figure.axes[-1].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 

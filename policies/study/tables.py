@@ -42,7 +42,7 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
     columns, more = ["group", "of", "measure", "difference", "95 %", "n"], {}
     if kind == DECLARED:
         titles = {name: name for name in design.rounds.declared} if design.rounds else WORDS
-        asked = titles if design.draws > 1 else ()
+        asked = titles if (design.factors or design.rounds) and design.draws > 1 else ()
         planned = {titles[name]: f"{100 * detectable(design, name):.0f} points" for name in asked}
         columns += ["p", "p, Holm", "detectable"]
         more["detectable, as planned"] = lambda each: planned.get(each.label, DASH)
