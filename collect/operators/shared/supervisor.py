@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from handrail.collect.operators.modes import TeleopMode
+from handrail.collect.operators.modes import Focus, TeleopMode
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.scripted import ScriptedOperator, scripted_operator
@@ -83,3 +83,12 @@ def supervisor(model: RobotModel, mode: TeleopMode, task: TaskSpec, human: Human
     """Return who supervises a policy that does a task, and helps in a mode."""
     helper = scripted_operator(model, mode, task, human)
     return Supervisor(helper, Vigilance(), model.description.world.scale)
+
+
+def hand_supervisor(model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings) -> Supervisor:
+    """Return who supervises as `supervisor`, but leaves the base to the policy whatever the mode owns."""
+
+    def groups(focus: Focus) -> tuple[str, ...]:
+        return tuple(group for group in mode.groups(focus) if group != "base")
+
+    return supervisor(model, replace(mode, groups=groups), task, human)
