@@ -42,7 +42,9 @@ def test_commands_parse(words):
 
 def test_lerobot_s_own_parser_takes_the_training_commands():
     recorded_by_lerobot = {
-        word for word in chain(*commands("lerobot-record")) if word.startswith("--dataset.root=")
+        word
+        for word in chain(*commands("lerobot-record"), *commands("lerobot-rollout"))
+        if word.startswith("--dataset.root=")
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
