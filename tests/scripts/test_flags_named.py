@@ -11,6 +11,7 @@ from lerobot.configs.dataset import DatasetRecordConfig
 from lerobot.configs.default import EvalConfig
 from lerobot.envs.configs import EnvConfig
 from lerobot.robots import RobotConfig
+from lerobot.rollout.configs import DAggerStrategyConfig
 from lerobot.teleoperators import TeleoperatorConfig
 from pages import CONFIGS, PAGES, text
 from places import FLOORS, ROOT, sources
@@ -50,6 +51,7 @@ def known() -> set[str]:
         chosen = [each for name, each in kind.get_known_choices().items() if name.startswith("handrail")]
         found |= {f"--{part}.{entry.name}" for each in chosen for entry in fields(each)}
     found |= {f"--dataset.{entry.name}" for entry in fields(DatasetRecordConfig)}
+    found |= {"--strategy.type", *(f"--strategy.{entry.name}" for entry in fields(DAggerStrategyConfig))}
     return found | {f"--eval.{entry.name}" for entry in fields(EvalConfig)}
 
 
