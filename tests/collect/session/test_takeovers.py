@@ -5,6 +5,7 @@ import io
 import json
 import re
 from contextlib import closing
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,7 +109,8 @@ def test_edits_keep_the_columns(edit, takeovers, tmp_path):
         for name in SHARED:
             assert np.array_equal(kept[name], whole[name][first:][: row["length"]]), name
     opened = LeRobotDataset("handrail/set", root=new)
-    assert opened[7]["owner"].shape == read_info(new).features["owner"].shape
+    item: dict[str, Any] = opened[7]
+    assert item["owner"].shape == read_info(new).features["owner"].shape
 
 
 def test_a_demonstration_beside_take_overs_says_that_its_operator_drove(takeovers, tmp_path):
