@@ -42,6 +42,11 @@ OPERATORS = Registry(
             "a script that watches a policy (--policy) and helps where it gets no further",
         ),
         OperatorSpec(
+            "hand_supervisor",
+            "handrail.collect.operators.shared.supervisor:hand_supervisor",
+            "as supervisor, but helps with the hand alone and leaves the base to the policy",
+        ),
+        OperatorSpec(
             "browser",
             "handrail.collect.cockpit.cockpit:open_cockpit",
             "a person at a browser, with keys, a gamepad or touch",

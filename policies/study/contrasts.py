@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.replicates import student
-from handrail.policies.study.design import CONTRASTS, Factors, StudyDesign
+from handrail.policies.study.design import CONTRASTS, Factors, Rounds, StudyDesign
 from handrail.policies.study.power import weights
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
@@ -29,6 +30,8 @@ def contrasts(results: Results) -> list[Contrast]:
     design, tasks = results.progress.design, tuple(results.progress.design.tasks)
     factors = design.factors
     asked = [_factor(factors, name) for name in factors.primary] if factors else []
+    if rounds := design.rounds:
+        asked = [_after(rounds, pair, rounds.count) for pair in rounds.primary]
     declared = [each for one in asked if (each := _contrast(results, DECLARED, tasks, *one))]
     whole = [each for each in declared if each.counts == (design.draws,) != (1,)]
     tested = {each.label: each for each in adjusted(whole)}
@@ -40,6 +43,15 @@ def contrasts(results: Results) -> list[Contrast]:
 
 def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
     ask, factors = partial(_contrast, results, EXPLORATORY, tasks), design.factors
+    if rounds := design.rounds:
+        for number, pair in product(range(1, rounds.count + 1), rounds.pairs):
+            if tasks != tuple(design.tasks) or rounds.words(pair, number) not in rounds.declared:
+                yield ask(*_after(rounds, pair, number))
+            if number == rounds.count:
+                yield ask(*_after(rounds, pair, number), "clean")
+        for number, way in product(range(1, rounds.count + 1), rounds.ways):
+            yield ask(*_pair(f"{way}-{number} intent", f"{design.baseline} intent"))
+        return
     if not factors:
         rivals = [mode for mode in design.modes if mode != design.baseline]
         yield from (ask(*_pair(mode, design.baseline)) for mode in rivals)
@@ -62,6 +74,11 @@ def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) 
 def _factor(factors: Factors, name: str, ending: str = "") -> tuple[str, Parts]:
     parts = {f"{mode}{ending}": weight for mode, weight in weights(factors, name).items()}
     return f"{WORDS[name]}{_bracketed(ending)}", parts
+
+
+def _after(rounds: Rounds, pair: tuple[str, str], number: int) -> tuple[str, Parts]:
+    one, other = (f"{way}-{number} intent" for way in pair)
+    return rounds.words(pair, number), {one: 1.0, other: -1.0}
 
 
 def _pair(one: str, other: str, ending: str = "") -> tuple[str, Parts]:

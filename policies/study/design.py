@@ -15,6 +15,7 @@ episodes = 50                   successful demonstrations in each mode, at least
 steps = 4000                    updates of each policy; the most there may be where there is a [flat]
 batch_size = 0                  samples an update; 0 for the preset's
 rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
+round_minutes = 0.0             with [rounds]: of the operator's time in each way in each round
 
 [flat]                          optional: train until the loss on held-out episodes is flat, one rule for all
 held_out = 0.1                  share of the episodes, 5 at least
@@ -38,6 +39,16 @@ same_number = 1                 draws of which policies also learn from `episode
 [encoders]                      optional: policies look through these, one a task, when they drive: nobody
 reach = "ridgeback_ur10-reach"  tells them where things are
 
+[rounds]                        optional: all begin with a policy of the one mode; then the same operator time
+count = 2                       is spent in several ways, in so many rounds; after each a policy learns anew
+primary = [["whole", "more"]]   pairs of ways, compared after the last round and tested; [] for none
+sd = 0.1                        from all data of its way so far. Policies write intents and drive alone.
+
+[rounds.ways.whole]             a way, by its name; attempts that do not fit into the time are left out
+operator = "supervisor"         who records: scripted, or a supervisor of the policy of the round before
+arbiter = "whole"               who owns what while that policy drives; "" if none drives beside the operator
+corrections = "weighted"        how corrections are learnt from: all, only or weighted
+
 [robustness]                    optional, exploratory: what else policies go through
 perturbations = ["push", "shift", "delay"]      each a condition of its own; [] for none
 protections = ["mpc", "filter"] of policies that command joint velocities; "none": of intents, without the MPC
@@ -47,7 +58,8 @@ draws = 1                       the first so many
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from itertools import combinations
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -71,6 +83,7 @@ class TaskDesign:
     steps: AtLeastOne = 4000
     batch_size: Count = 0
     rollout_limit: float = 0.0
+    round_minutes: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -126,6 +139,40 @@ class Robustness:
 
 
 @dataclass(frozen=True)
+class Way:
+    """How an operator's time is spent; explained above."""
+
+    operator: str = "scripted"
+    arbiter: str = ""
+    corrections: Literal["all", "only", "weighted"] = "all"
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """Rounds of recording and learning, in several ways; explained above."""
+
+    ways: Mapping[str, Way]
+    count: Annotated[int, Meta(ge=1, le=20)] = 2
+    primary: tuple[tuple[str, str], ...] = ()
+    sd: float = 0.1
+
+    def words(self, pair: tuple[str, str], number: int) -> str:
+        """Return what two ways are compared in after a round."""
+        return f"{' − '.join(pair)} after round {number}"
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """All pairs of ways, those that are tested as they are declared."""
+        found = combinations(self.ways, 2)
+        return [(two, one) if (two, one) in self.primary else (one, two) for one, two in found]
+
+    @property
+    def declared(self) -> dict[str, tuple[str, str]]:
+        """The pairs that are tested, by their words."""
+        return {self.words(pair, self.count): pair for pair in self.primary}
+
+
+@dataclass(frozen=True)
 class StudyDesign:
     """A whole study, called after its file; its settings are explained above."""
 
@@ -141,15 +188,17 @@ class StudyDesign:
     flat: Flat | None = None
     factors: Factors | None = None
     beside: Beside | None = None
+    rounds: Rounds | None = None
     encoders: Mapping[str, str] = field(default_factory=dict)
     robustness: Robustness | None = None
     digest: str = ""  # of what its file says, comments left out; "" where it comes from no file
 
     def check(self) -> None:
         """Check names, and how the settings fit each other; `check_jobs` checks the settings of its jobs."""
-        if len(self.modes) < 2 or not self.tasks:
+        if (len(self.modes) != 1 if self.rounds else len(self.modes) < 2) or not self.tasks:
+            wanted = "one mode" if self.rounds else "two modes or more"
             raise HandrailError(
-                f"study {self.name}: expected two modes or more and a task, "
+                f"study {self.name}: expected {wanted} and a task, "
                 f"got {', '.join(self.modes) or 'no mode'}; {', '.join(self.tasks) or 'no task'}"
             )
         check_known("mode", self.modes, MODES)
@@ -158,6 +207,8 @@ class StudyDesign:
         if self.encoders and self.encoders.keys() != self.tasks.keys():
             words = f"expected one of each task ({', '.join(self.tasks)}) or none"
             raise HandrailError(f"study {self.name}: encoders: {words}, got {', '.join(self.encoders)}")
+        if self.rounds:
+            self._check_rounds(self.rounds)
         once: dict[str, tuple[str, ...]] = {"modes": self.modes}
         draws: dict[str, int] = {}
         if factors := self.factors:
@@ -179,6 +230,21 @@ class StudyDesign:
                 raise HandrailError(
                     f"study {self.name}: {name} expected at most {self.draws} draws, got {count}"
                 )
+
+    def _check_rounds(self, rounds: Rounds) -> None:
+        """Check that there are ways to compare, and nothing that rounds do not know of."""
+        where = f"study {self.name}: rounds"
+        for other in ("flat", "factors", "beside", "encoders", "robustness"):
+            if getattr(self, other):
+                raise HandrailError(f"{where}: expected no {other} beside them")
+        for way in rounds.ways:
+            if not way.isidentifier():
+                raise HandrailError(f"{where}: expected ways whose names are words, got {way!r}")
+        for pair in rounds.primary:
+            check_known("way", pair, rounds.ways)
+        for task, each in self.tasks.items():
+            if not each.round_minutes:
+                raise HandrailError(f"{where}: expected round_minutes of task {task}, found none")
 
 
 def check_known(what: str, names: Iterable[str], choices: Iterable[str]) -> None:

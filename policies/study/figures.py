@@ -17,6 +17,7 @@ CAPTIONS = {
     "answer": "Success of the policies; lines: 95 %, ticks: draws. Round: joint velocities, unprotected;"
     " diamonds: intent through the MPC, policy and controller;"
     " squares: the same number of demonstrations.",
+    "rounds": "Success of the policies, which drive alone, against the operator's time so far; lines: 95 %.",
     "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
     "robustness": "Success disturbed and undisturbed.",
 }
@@ -30,6 +31,8 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     made: dict[str, Any] = {}
     if any(each.interval and each.family == DECLARED for each in found):
         made["contrasts"] = _contrasts(found)
+    if rounds := results.progress.design.rounds:
+        return made | ({"rounds": _rounds(tasks, list(rounds.ways), results)} if tasks else {})
     if tasks:
         made["answer"] = _answer(tasks, results)
     if curved:
@@ -85,6 +88,28 @@ def _answer(tasks: Sequence[str], results: Results) -> Any:
         axes.set(xlabel="policy success [%]", xlim=(-3, 103), ylim=(len(styles) - 0.4, -0.6))
         axes.set(yticks=range(len(styles)), yticklabels=[style["label"] for style in styles])
         tidy(axes, "x")
+    return figure
+
+
+def _rounds(tasks: Sequence[str], ways: Sequence[str], results: Results) -> Any:
+    """One panel a task: success after every round, a line each way, all from the same policy on."""
+    figure, panels = _panels(tasks, 3.2, sharey=True)
+    for axes, task in panels:
+        found = results.of_task(task)
+        for place, way in enumerate(ways):
+            shown = [each for each in found if (cell := each.learners[0].cell).mode == way or not cell.before]
+            rounds = np.array([len(each.learners[0].cell.rounds) - 1 for each in shown])
+            sizes = results.progress.design.tasks[task]
+            minutes = sizes.minutes + rounds * sizes.round_minutes
+            values = np.array([each.value.estimate for each in shown])
+            errors = np.abs(np.array([each.value.interval for each in shown]).T - values) * 100
+            style = {"color": COLOURS[place], "marker": "o", "label": way, "lw": 1.4}
+            shift = 0.02 * (place - 1) * sizes.round_minutes
+            axes.errorbar(minutes + shift, 100 * values, yerr=errors, elinewidth=1.0, ms=4, **style)
+        axes.set(xlabel="operator's time [min]", ylim=(-3, 103))
+        tidy(axes, "y")
+    figure.axes[0].set_ylabel("policy success [%], 95 %")
+    figure.axes[-1].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.design import Rounds, StudyDesign
 
 CONDITIONS = ("nominal", "disturbed", "protected")
 
@@ -15,13 +15,25 @@ class StudyCell:
     """What is collected as one dataset: a task in a mode, one draw."""
 
     task: str
-    mode: str
+    mode: str  # or the way in which the time of a round is spent
     draw: int
+    before: "StudyCell | None" = None
+    """That of the round before: its policy drives here, and what is learnt here is added to its data."""
+
+    @property
+    def rounds(self) -> "tuple[StudyCell, ...]":
+        """The cells of all rounds so far; a policy learns from the data of all of them."""
+        return (*(self.before.rounds if self.before else ()), self)
+
+    @property
+    def kind(self) -> str:
+        """What it is, of any task and draw: `ee`, or `whole-2` of the second round."""
+        return f"{self.mode}-{len(self.rounds) - 1}" if self.before else self.mode
 
     @property
     def name(self) -> str:
         """A name for files and logs: `reach/ee/3`."""
-        return f"{self.task}/{self.mode}/{self.draw}"
+        return f"{self.task}/{self.kind}/{self.draw}"
 
 
 @dataclass(frozen=True)
@@ -36,7 +48,7 @@ class StudyPolicy:
     def label(self) -> str:
         """Its name in an evaluation: the mode, and its special features."""
         intent = " intent" if self.actions == "intent" else ""
-        return self.cell.mode + intent + (" same number" if self.budget == "number" else "")
+        return self.cell.kind + intent + (" same number" if self.budget == "number" else "")
 
     @property
     def name(self) -> str:
@@ -60,7 +72,15 @@ class StudyJob:
     @property
     def needs(self) -> tuple[str, ...]:
         """Names of the jobs that come before."""
-        return (f"collect/{self.cell.name}",) if self.policy else ()
+        if self.policy:
+            return tuple(f"collect/{each.name}" for each in self.cell.rounds)
+        return (self.before.name,) if self.before else ()
+
+    @property
+    def before(self) -> "StudyJob | None":
+        """The job of the policy of the round before."""
+        before = self.cell.before
+        return StudyJob(before, StudyPolicy(before, "intent")) if before else None
 
 
 def jobs(design: StudyDesign) -> list[StudyJob]:
@@ -70,6 +90,10 @@ def jobs(design: StudyDesign) -> list[StudyJob]:
 
 def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
     """Yield the jobs of a draw: after each draw what is done is balanced."""
+    if rounds := design.rounds:
+        for cell in _cells(design, rounds, draw):
+            yield from (StudyJob(cell), StudyJob(cell, StudyPolicy(cell, "intent")))
+        return
     robust, beside = design.robustness is not None and draw < design.robustness.draws, design.beside
     cells = [[StudyCell(task, mode, draw) for mode in design.modes] for task in design.tasks]
     for each in cells:
@@ -82,6 +106,16 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
             yield StudyJob(cell, StudyPolicy(cell, "intent"), robust)
         if draw < beside.same_number:
             yield StudyJob(cell, StudyPolicy(cell, budget="number"))
+
+
+def _cells(design: StudyDesign, rounds: Rounds, draw: int) -> Iterator[StudyCell]:
+    """Yield the cells of a draw, task by task: with which all begin, then round by round."""
+    for task in design.tasks:
+        yield (base := StudyCell(task, design.baseline, draw))
+        last = dict.fromkeys(rounds.ways, base)
+        for _ in range(rounds.count):
+            last = {way: StudyCell(task, way, draw, before) for way, before in last.items()}
+            yield from last.values()
 
 
 @dataclass(frozen=True)
@@ -101,6 +135,10 @@ class StudyLayout:
     def dataset(self, cell: StudyCell) -> Path:
         """Return the folder of a dataset."""
         return self.root / "datasets" / cell.name
+
+    def merged(self, cell: StudyCell) -> Path:
+        """Return the folder of the data of all rounds up to a cell's, there while a policy learns."""
+        return self.root / "merged" / cell.name
 
     def policy(self, policy: StudyPolicy) -> Path:
         """Return the folder of a training."""

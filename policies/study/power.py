@@ -25,31 +25,34 @@ def detectable(design: StudyDesign, contrast: str, tasks: int = 0, tests: int = 
     the standard deviation that the design expects of a policy's success from draw to draw.
 
     Args:
-        design: Of the study; it has factors, and two draws or more.
-        contrast: Which.
+        design: Of the study; it has factors or rounds, and two draws or more.
+        contrast: Which; any one of two ways.
         tasks: T; 0 for all of the study.
         tests: m; 0 for as many as are declared, 1 where nothing is.
     """
     factors = design.factors
-    assert factors is not None
-    one = factors.sd**2 + _WORST / design.rollouts
-    variance = one * sum(weight**2 for weight in weights(factors, contrast).values())
+    asked = factors or design.rounds
+    assert asked is not None
+    squares = sum(weight**2 for weight in weights(factors, contrast).values()) if factors else 2.0
+    variance = (asked.sd**2 + _WORST / design.rollouts) * squares
     error = float(np.sqrt(variance / (design.draws * (tasks or len(design.tasks)))))
-    return reach(tests or max(1, len(factors.primary)), design.draws - 1) * error
+    return reach(tests or max(1, len(asked.primary)), design.draws - 1) * error
 
 
 def plan(design: StudyDesign) -> str:
     """Return in words what is declared and what it can detect."""
-    factors = design.factors
-    if not factors or not factors.primary:
+    asked, rounds = design.factors or design.rounds, design.rounds
+    if not asked or not asked.primary:
         return "Nothing is declared: whatever comes out is exploratory."
-    declared = f"Declared: {', '.join(factors.primary)}, over {', '.join(design.tasks)} together."
+    names = tuple(rounds.declared) if rounds else design.factors.primary if design.factors else ()
+    declared = f"Declared: {'; '.join(names)}, over {', '.join(design.tasks)} together."
     if design.draws < 2:
         return f"{declared} One draw tests nothing."
-    found = ", ".join(f"{each} {100 * detectable(design, each):.0f}" for each in factors.primary)
-    single = ", ".join(f"{each} {100 * detectable(design, each, 1, 1):.0f}" for each in CONTRASTS)
+    found = ", ".join(f"{each} {100 * detectable(design, each):.0f}" for each in names)
+    alone = names[:1] if rounds else CONTRASTS
+    single = ", ".join(f"{each} {100 * detectable(design, each, 1, 1):.0f}" for each in alone)
     return (
         f"{declared} {design.draws} draws of {design.rollouts} rollouts detect in 80 % of such studies, if a"
-        f" policy's success varies by {100 * factors.sd:g} points from draw to draw, by Student's t after"
+        f" policy's success varies by {100 * asked.sd:g} points from draw to draw, by Student's t after"
         f" Holm: {found} points; one contrast of one task by itself, which is exploratory: {single}."
     )

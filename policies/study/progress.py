@@ -11,6 +11,7 @@ from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.interface.checkpoint import last_checkpoint
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import StudyJob, StudyLayout, jobs
 from handrail.policies.study.settings import evaluations, fingerprint
@@ -34,14 +35,21 @@ class StudyProgress:
         return [job.name for job in self.jobs if job.name not in self.done]
 
     def todo(self, only: str = "") -> list[StudyJob]:
-        """Return the jobs to be done, of one cell or all: what is missing, and recordings that it needs.
+        """Return the jobs to be done, of one cell or all: what is missing, and what that needs.
 
-        A dataset that is gone is recorded again only for a policy that is still to be trained on it.
+        A dataset or a policy that is gone is made again only for a job that is still to be done with it.
         """
-        chosen = [job for job in self.jobs if only in ("", job.cell.name)]
-        needed = {name for job in chosen if job.name not in self.done for name in job.needs}
-        gone = {job.name for job in chosen if job.name in needed and not self._has_dataset(job)}
-        return [job for job in chosen if job.name not in self.done or job.name in gone]
+        todo: list[StudyJob] = []
+        needed: set[str] = set()
+        for job in reversed(self.jobs):
+            if job.name in needed:
+                chosen = job.name not in self.done or not self._is_there(job)
+            else:
+                chosen = job.name not in self.done and only in ("", job.cell.name)
+            if chosen:
+                todo.append(job)
+                needed |= {*job.needs}
+        return todo[::-1]
 
     def _is_done(self, job: StudyJob) -> bool:
         """Return whether a job was done with just these settings, and the small files it made are there.
@@ -58,9 +66,13 @@ class StudyProgress:
         except HandrailError:
             return False
 
-    def _has_dataset(self, job: StudyJob) -> bool:
-        """Return whether the dataset that a job noted is still there, whole."""
-        root, noted = self.layout.dataset(job.cell), self._notes[job.name].get("result", {})
+    def _is_there(self, job: StudyJob) -> bool:
+        """Return whether the policy or the dataset that a job noted is still there, whole."""
+        noted = self._notes[job.name].get("result", {})
+        if job.policy:
+            last = last_checkpoint(self.layout.policy(job.policy))
+            return last is not None and int(last.name) == noted.get("steps")
+        root = self.layout.dataset(job.cell)
         try:
             return read_info(root).episodes >= noted.get("episodes", 1) and any(root.glob("data/*/*.parquet"))
         except HandrailError:

@@ -11,6 +11,7 @@ from handrail.datasets.presentation.drawing import png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.markup import panels
 from handrail.datasets.presentation.table import Table
+from handrail.datasets.presentation.wording import percent
 from handrail.datasets.statistics.contrast import Contrast
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.imitation.training.plateau import Plateau
@@ -39,6 +40,16 @@ _HOW = (
     " explore, and no interval is adjusted. A system claim compares a policy and a controller with the best"
     " of the unprotected policies in this very measure, chosen afterwards, which is in its favour."
 )
+_HOW_ROUNDS = (
+    "A draw is a fresh recording (other scenes, other scripted persons), one training seed and beginnings"
+    " of its own for the rollouts; it is the same for all ways, so draws are pairs. All begin with the same"
+    " policy. Then every way gets the same operator time, attention included: the length of whole attempts,"
+    " failed ones too. After each round a policy learns from nothing, from all successful episodes of its way"
+    " so far, in the same number of updates, and is measured alone: it writes the operator's intent, which"
+    " the MPC completes. Intervals are 95 %: Student's t over draws; with one draw Wilson's. Contrasts are"
+    " taken within each draw; several tasks count alike. Only declared contrasts are tested, p after Holm"
+    " over these; all others explore, and no interval is adjusted."
+)
 _FORMAT = "handrail.study/5"
 
 
@@ -66,7 +77,7 @@ def _report(
     by_task = [(task.replace("_", " ").capitalize(), tables.of_task(task, results)) for task in design.tasks]
     again = [tables.times_table(results), tables.cells_table(results, config.preset)]
     return Report(
-        title=f"Study {design.name}: {', '.join(design.modes)}",
+        title=f"Study {design.name}: {', '.join(design.rounds.ways if design.rounds else design.modes)}",
         headline=" ".join(answer(found, design)),
         limits=cautions(results),
         sections=[
@@ -75,7 +86,7 @@ def _report(
             *by_task,
             ("Again", [table for table in again if table.rows]),
         ],
-        how=f"{_HOW} {plan(design)}",
+        how=f"{_HOW_ROUNDS if design.rounds else _HOW} {plan(design)}",
         content=_content(config, results, found),
         values=[each.value for each in results.conditions.values()],
         contrasts=found,
@@ -126,18 +137,26 @@ def _write_page(
         f" `{report.content['again']}` runs one cell anew, with the same rows and the same rollouts; digests"
         " are in the JSON."
     )
-    write_part(page, "Teleoperation modes", f"study {design.name}", "\n\n".join(filter(None, parts)))
+    title = "Taking over from a policy" if design.rounds else "Teleoperation modes"
+    write_part(page, title, f"study {design.name}", "\n\n".join(filter(None, parts)))
     return [page, data, *pictures.values()]
 
 
 def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
     """Return the headline, a sentence each: the interaction first, as means over what differs mislead."""
     declared = {each.label: each for each in found if each.family == DECLARED}
+    if declared and design.rounds:
+        return [sentence(each, name, _sides(each)) for name, each in declared.items()]
     if declared:
         return [_told(declared[name]) for name in reversed(WORDS.values()) if name in declared]
-    if design.factors and design.factors.primary:
-        return ["No draw has all cells of the 2 × 2 on all tasks yet: nothing can be said."]
+    if (asked := design.factors or design.rounds) and asked.primary:
+        cells = "cells of the 2 × 2" if design.factors else "ways"
+        return [f"No draw has all {cells} on all tasks yet: nothing can be said."]
     return ["No contrast was declared before the run: what is shown explores, and nothing is tested."]
+
+
+def _sides(each: Contrast) -> str:
+    return " against ".join(percent(side) for side in each.sides or ())
 
 
 def _told(each: Contrast) -> str:

@@ -121,12 +121,17 @@ class Results:
             each for each in self.conditions.values() if (each.task, bool(each.treatment)) == (task, treated)
         ]
 
-    def collected(self, task: str, mode: str) -> list[dict[str, Any]]:
-        """Return what was collected in a mode, draw by draw."""
+    @property
+    def kinds(self) -> list[str]:
+        """What was collected: the modes; of rounds with what all begin, then round by round."""
+        return list(dict.fromkeys(job.cell.kind for job in self.progress.jobs))
+
+    def collected(self, task: str, kind: str) -> list[dict[str, Any]]:
+        """Return what was collected of a kind, draw by draw."""
         return [
             note["result"]
             for job in self.progress.jobs
-            if job.policy is None and (job.cell.task, job.cell.mode) == (task, mode)
+            if job.policy is None and (job.cell.task, job.cell.kind) == (task, kind)
             if (note := self.progress.note(job))
         ]
 

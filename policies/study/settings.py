@@ -14,12 +14,13 @@ from handrail.controllers.typed import decoded
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.training.presets import as_json, resolved
-from handrail.policies.study.design import MOST_DRAWS, StudyDesign, check_known
+from handrail.policies.study.design import MOST_DRAWS, StudyDesign, Way, check_known
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 PRESETS = Path(__file__).parent / "presets"
 BATCH = 10  # episodes, until the next person has a turn
 _FPS = 20  # [Hz]
+_ROUND = 2 * 10**8  # between the seeds of two rounds' recordings; more than the largest of a draw
 _DATASET, _POLICY = Path("dataset"), Path("policy")  # of settings that are only looked at
 _RECORDED = ("task", "mode", "noise", "time_limit", "seed")
 _LEARNT = (
@@ -55,21 +56,48 @@ def seed_of(design: StudyDesign, cell: StudyCell) -> int:
     return MOST_DRAWS * design.seed + cell.draw
 
 
-def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
-    """Return how the next turn of a dataset is recorded, `so_far` episodes being in it."""
+def way_of(cell: StudyCell, design: StudyDesign) -> Way:
+    """Return how the operator's time is spent in a cell."""
+    return design.rounds.ways[cell.mode] if design.rounds and cell.before else Way()
+
+
+def wanted(cell: StudyCell, design: StudyDesign) -> dict[str, float]:
+    """Return how many successful episodes a dataset has at least, and minutes of the operator's time."""
+    task = design.tasks[cell.task]
+    if cell.before:
+        return {"episodes": 0, "minutes": task.round_minutes}
+    return {"episodes": task.episodes, "minutes": task.minutes}
+
+
+def recording(
+    cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0, driver: Path = _POLICY
+) -> RecordConfig:
+    """Return how the next turn of a dataset is recorded, `so_far` episodes being in it.
+
+    Args:
+        cell: of the dataset.
+        design: of the study.
+        root: of the dataset.
+        so_far: number of its episodes.
+        driver: folder of the policy that drives, where one does.
+    """
+    way = way_of(cell, design)
+    beside: dict[str, Any] = {"policy": (str(driver),), "arbiter": way.arbiter} if way.arbiter else {}
     return RecordConfig(
         task=cell.task,
-        mode=cell.mode,
+        mode=cell.rounds[0].mode,
+        operator=way.operator,
         person=1 + cell.draw * design.persons + so_far // BATCH % design.persons,
-        seed=seed_of(design, cell),
+        seed=seed_of(design, cell) + _ROUND * (len(cell.rounds) - 1),
         dataset=DatasetConfig(
-            repo_id=f"study/{cell.task}-{cell.mode}",
+            repo_id=f"study/{cell.task}-{cell.kind}",
             root=str(root),
             num_episodes=BATCH - so_far % BATCH,
             fps=_FPS,
         ),
         resume=root.exists(),
         workers=1,  # a job has one core
+        **beside,
     )
 
 
@@ -90,7 +118,8 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
         batch_size=task.batch_size,
         seed=policy.cell.draw,
         draw=policy.cell.draw,
-        minutes=task.minutes if timed else 0.0,
+        minutes=task.minutes if timed and not design.rounds else 0.0,
+        corrections=way_of(policy.cell, design).corrections,
         episodes=0 if timed else task.episodes,
         encoder=design.encoders.get(policy.cell.task, ""),
         resume=True,
@@ -126,18 +155,21 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     Of a dataset `recording` says what it is; `wanted` may grow. A policy depends on both, on its `training`
     and on its `evaluations`.
     """
-    cell = job.cell
-    config, task = recording(cell, design, _DATASET), design.tasks[cell.task]
+    cell, config = job.cell, recording(job.cell, design, _DATASET)
     recorded = _some(config, _RECORDED) | {
         "persons": design.persons,
         "turn": BATCH,
         "fps": config.dataset.fps,
     }
-    found = {"recording": recorded, "wanted": {"episodes": task.episodes, "minutes": task.minutes}}
+    if job.before:
+        before = fingerprint(job.before, design)
+        recorded |= _some(config, ("operator", "arbiter"))
+        recorded["before"] = {part: before[part] for part in ("recording", "wanted", "training")}
+    found = {"recording": recorded, "wanted": wanted(cell, design)}
     if job.policy is None:
         return found
     learnt = training(job.policy, design, _DATASET, _POLICY)
-    trained = _some(learnt, _LEARNT)
+    trained = _some(learnt, (*_LEARNT, "corrections") if job.before else _LEARNT)
     if learnt.encoder:
         from handrail.policies.imitation.interface.encoder import find_encoder
 

@@ -13,7 +13,7 @@ from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.contrast import Contrast
-from handrail.policies.study.contrasts import CONTRASTS, DECLARED, EXPLORATORY, SYSTEM, WORDS
+from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS
 from handrail.policies.study.power import detectable
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
@@ -32,8 +32,8 @@ def of_contrasts(found: Sequence[Contrast], results: Results) -> list[Table]:
 
 def of_task(task: str, results: Results) -> list[Table]:
     """Return the tables of a task without empty ones."""
-    kinds = (conditions_table, failures_table, collection_table, quality_table, treatments_table)
-    return [table for make in kinds if (table := make(task, results)).rows]
+    kinds = conditions_table, failures_table, collection_table, effort_table, quality_table
+    return [table for make in (*kinds, treatments_table) if (table := make(task, results)).rows]
 
 
 def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> Table:
@@ -41,8 +41,9 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
     design = results.progress.design
     columns, more = ["group", "of", "measure", "difference", "95 %", "n"], {}
     if kind == DECLARED:
-        names = CONTRASTS if design.factors and design.draws > 1 else ()
-        planned = {WORDS[name]: f"{100 * detectable(design, name):.0f} points" for name in names}
+        titles = {name: name for name in design.rounds.declared} if design.rounds else WORDS
+        asked = titles if (design.factors or design.rounds) and design.draws > 1 else ()
+        planned = {titles[name]: f"{100 * detectable(design, name):.0f} points" for name in asked}
         columns += ["p", "p, Holm", "detectable"]
         more["detectable, as planned"] = lambda each: planned.get(each.label, DASH)
     chosen = [each for each in found if each.family == kind]
@@ -91,9 +92,28 @@ def failures_table(task: str, results: Results) -> Table:
 def collection_table(task: str, results: Results) -> Table:
     """Return what was collected, all draws of a mode together."""
     headings = ("mode", "draws", "episodes", "success", "operator time", "s a success", "successes / h")
-    found = {mode: results.collected(task, mode) for mode in results.progress.design.modes}
-    rows = [(mode, *_collected(each)) for mode, each in found.items() if each]
+    found = {kind: results.collected(task, kind) for kind in results.kinds}
+    rows = [(kind, *_collected(each)) for kind, each in found.items() if each]
     return Table((*headings, "failures"), rows, "Collecting")
+
+
+def effort_table(task: str, results: Results) -> Table:
+    """Return what helping a policy asks of the operator, all draws of a round together."""
+    headings = ("round", "attention", "steering", "of the attention", "corrections / min", "contacts / min")
+    found = {kind: results.collected(task, kind) for kind in results.kinds}
+    rows = [(kind, *_effort(each)) for kind, each in found.items() if each and results.progress.design.rounds]
+    return Table(headings, rows, "The operator's effort: attention is the time of whole attempts")
+
+
+def _effort(found: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    minutes, steered = (sum(each[name] for each in found) for name in ("minutes", "steered"))
+    rates = (
+        number(sum(each["quality"][name] * each["episodes"] for each in found) / minutes)
+        if all(name in each["quality"] for each in found)
+        else DASH
+        for name in ("interventions", "contacts")
+    )
+    return f"{60.0 * minutes:.0f} s", f"{60.0 * steered:.0f} s", percent(steered / minutes), *rates
 
 
 def _collected(found: Sequence[dict[str, Any]]) -> tuple[str, ...]:
@@ -114,7 +134,7 @@ def _collected(found: Sequence[dict[str, Any]]) -> tuple[str, ...]:
 
 def quality_table(task: str, results: Results) -> Table:
     """Return the quality metrics of the demonstrations: the mean over draws of the mean over episodes."""
-    modes = [mode for mode in results.progress.design.modes if results.collected(task, mode)]
+    modes = [kind for kind in results.kinds if results.collected(task, kind)]
     found = [[each["quality"] for each in results.collected(task, mode)] for mode in modes]
     rows, titles = [], {metric.name: metric.title for metric in METRICS}
     for name in dict.fromkeys(name for draws in found for each in draws for name in each):

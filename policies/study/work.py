@@ -12,17 +12,26 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.merge import drop_episodes, merge_datasets
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.quality.measure import measure
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.digest import digest_of_dataset
-from handrail.datasets.reading.load import recorded_episodes
+from handrail.datasets.reading.load import each_opened, recorded_episodes
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
 from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
-from handrail.policies.study.settings import evaluations, fingerprint, recording, training
+from handrail.policies.study.settings import (
+    evaluations,
+    fingerprint,
+    recording,
+    training,
+    wanted,
+    way_of,
+)
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
 
@@ -37,11 +46,20 @@ def summary(root: Path, seed: int) -> dict[str, Any]:
         "episodes": len(episodes),
         "successes": sum(bool(episode.success) for episode in episodes),
         "minutes": sum(episode.seconds for episode in episodes) / 60.0,
+        "steered": sum(map(_steered, each_opened(episodes))) / 60.0,
         "frames": sum(episode.count for episode in episodes),
         "reasons": dict(Counter(str(reason or "not recorded") for reason in failed).most_common()),
         "digest": digest_of_dataset(root),
         "quality": {name: mean for name, mean in means.items() if mean is not None},
     }
+
+
+def _steered(episode: Demonstration) -> float:
+    """Return how long the operator steered, and not only watched a policy [s]."""
+    try:
+        return episode.seconds * float((episode.numbers("intervention") > 0.0).mean())
+    except DoesNotApply:
+        return episode.seconds
 
 
 def do(job: StudyJob, design: StudyDesign, root: Path) -> None:
@@ -104,9 +122,9 @@ def work(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> dict[str, A
     """Do a job and return what is to be known of it when what is large is gone."""
     if job.policy:
         return _train_and_evaluate(job, job.policy, design, layout)
-    root, before = layout.dataset(job.cell), known_json(layout.done(job))
-    collect(job.cell, design, root)
-    found = summary(root, design.seed)
+    before = known_json(layout.done(job))
+    collect(job, design, layout)
+    found = summary(layout.dataset(job.cell), design.seed)
     same = before.get("settings") == fingerprint(job, design)
     expected = before.get("result", {}).get("digest", found["digest"])
     if same and not found["digest"].startswith(expected):  # an earlier version left the pictures out
@@ -115,26 +133,46 @@ def work(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> dict[str, A
     return found
 
 
-def collect(cell: StudyCell, design: StudyDesign, root: Path) -> None:
-    """Record in turns of a few episodes, each by another person, until there is enough."""
+def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
+    """Record in turns of a few episodes, each by another person, until there is enough.
+
+    In rounds, episodes that do not fit into the operator's time any more are removed.
+    """
     from handrail.collect.commands.record import record
 
-    wanted = design.tasks[cell.task]
+    cell, root, need = job.cell, layout.dataset(job.cell), wanted(job.cell, design)
+    driver = layout.policy(job.before.policy) if job.before and job.before.policy else Path()
+    share = None
+    if way_of(cell, design).arbiter:
+        from handrail.policies.imitation.evaluation.copilot import share
     while True:
         rows = read_episodes(root) if root.exists() else []
-        config = recording(cell, design, root, len(rows))
+        config = recording(cell, design, root, len(rows), driver)
         successes = sum(bool(row["success"]) for row in rows)
         minutes = sum(row["length"] for row in rows) / config.dataset.fps / 60.0
-        if successes >= wanted.episodes and minutes >= wanted.minutes:
-            return
-        if len(rows) >= _MOST_ATTEMPTS * wanted.episodes and successes < wanted.episodes:
+        if successes >= need["episodes"] and minutes >= need["minutes"]:
+            break
+        if len(rows) >= _MOST_ATTEMPTS * need["episodes"] and successes < need["episodes"]:
             raise HandrailError(
-                f"collecting {cell.name}: expected {wanted.episodes} successes, "
+                f"collecting {cell.name}: expected {need['episodes']} successes, "
                 f"got {successes} in {len(rows)} attempts"
             )
-        code = record(config)
+        code = record(config, share)
         if code:
             raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
+    if design.rounds:
+        ends = np.cumsum([row["length"] for row in rows]) / config.dataset.fps / 60.0
+        late = {row["episode_index"] for row, end in zip(rows, ends, strict=True) if end > need["minutes"]}
+        drop_episodes(root, lambda row: row["episode_index"] in late)
+
+
+def _learnt_from(cell: StudyCell, layout: StudyLayout) -> Path:
+    """Return the folder of what a policy learns from: the data of all rounds so far as one."""
+    parts, root = [layout.dataset(each) for each in cell.rounds], layout.merged(cell)
+    if len(parts) == 1:
+        return parts[0]
+    remove(root)
+    return merge_datasets(parts, root).root
 
 
 def _train_and_evaluate(
@@ -144,8 +182,9 @@ def _train_and_evaluate(
     from handrail.policies.imitation.evaluation.evaluation import evaluate
     from handrail.policies.imitation.training.training import train
 
-    start = time.monotonic()
-    folder = train(training(policy, design, layout.dataset(policy.cell), layout.policy(policy)))
+    start, cell = time.monotonic(), policy.cell
+    folder = train(training(policy, design, _learnt_from(cell, layout), layout.policy(policy)))
+    remove(layout.merged(cell))
     trained = time.monotonic()
     for what, config in evaluations(job, design, str(folder)).items():
         file = layout.evaluation(policy, what)

@@ -35,10 +35,11 @@ COLLECTED = {
     "episodes": 6,
     "successes": 5,
     "minutes": 1.5,
+    "steered": 0.5,
     "frames": 72,
     "reasons": {"timeout": 1},
     "digest": "d1ce",
-    "quality": {"length": 3.0, "sparc": -2.5},
+    "quality": {"length": 3.0, "sparc": -2.5, "interventions": 2.0, "contacts": 0.5},
 }
 LEARNT = {
     "steps": 10,

@@ -108,7 +108,7 @@ def flags(config: type, prefix: str = "") -> set[str]:
     names = set()
     for entry in fields(config):
         nested = entry.default_factory if is_dataclass(entry.default_factory) else None
-        if nested and entry.name in ("human", "cockpit", "teleop", "client"):
+        if nested and entry.name in ("human", "cockpit", "teleop", "client", "arbitration"):
             names.add(f"--{entry.name}.*")
         elif nested:
             names |= flags(nested, f"{prefix}{entry.name}.")

@@ -12,7 +12,7 @@ from handrail.collect.operators.scripted.input_map import StickMap
 from handrail.collect.operators.scripted.steering import Gains
 from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.catalogue import ARBITERS
-from handrail.collect.operators.shared.planning import Beside, Ensemble, Planner
+from handrail.collect.operators.shared.planning import Ensemble, Planner, ThreadedPlanner
 from handrail.collect.operators.shared.shared_operator import SharedOperator
 from handrail.collect.session.build import build_mode
 from handrail.collect.world.env import HandrailEnv
@@ -53,7 +53,7 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
             members, StickMap(env.model, mode, Gains().within(env.model.description.world)).full
         )
     if config.is_live:
-        planner = Beside(planner, env.period)
+        planner = ThreadedPlanner(planner, env.period)
     groups = Groups(Channels.of(env.model.description))
     arbiter = resolved(ARBITERS.find(config.arbiter).build)(groups, config.arbitration)
     modes = {each.name for each in (mode, *MODES.values()) if _is_completed(each)}

@@ -20,11 +20,14 @@ from handrail.policies.study.design import (
     Factors,
     Flat,
     Robustness,
+    Rounds,
     StudyDesign,
     TaskDesign,
+    Way,
 )
 from handrail.policies.study.settings import load_design
 
+SHOWN = ("\n", " = "), ("[", ""), ("[rounds.", ".")
 FACTORS = "[factors]\nhand_mpc = 'ee'\nhand_none = 'direct'\njoint_mpc = 'ee'\njoint_none = 'direct'\n"
 
 
@@ -78,9 +81,9 @@ def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(tmp_path,
 
 def test_every_setting_of_a_design_is_explained_where_people_look():
     written = design_module.__doc__ or ""
-    for kind in (StudyDesign, TaskDesign, Flat, Factors, Beside, Robustness):
+    for kind in (StudyDesign, TaskDesign, Flat, Factors, Beside, Robustness, Rounds, Way):
         for entry in dataclasses.fields(kind):
-            described = f"\n{entry.name} = " in written or f"[{entry.name}" in written
+            described = any(f"{mark}{entry.name}{end}" in written for mark, end in SHOWN)
             assert described or entry.name in ("name", "digest"), entry.name
 
 

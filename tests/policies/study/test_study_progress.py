@@ -183,7 +183,7 @@ def test_a_dataset_that_is_not_whole_is_recorded_before_it_is_learnt_from(damage
 def test_recorded_again_another_way_is_told(tmp_path, preset, monkeypatch):
     design, layout, found = everything(tmp_path, preset)
     edit(layout.done(found[0]), "result", {"digest": "d1ce"})
-    monkeypatch.setattr(work_module, "collect", lambda cell, design, root: None)
+    monkeypatch.setattr(work_module, "collect", lambda job, design, layout: None)
     monkeypatch.setattr(work_module, "summary", lambda root, seed: dict(COLLECTED, digest="d1ce+pictures"))
     assert "digest_before" not in work(found[0], design, layout)  # an earlier version left the pictures out
     monkeypatch.setattr(work_module, "summary", lambda root, seed: dict(COLLECTED, digest="0ther"))
