@@ -110,22 +110,6 @@ MODES = Registry(
             "dls",
             "steer the hand; base and arm follow by damped least squares: ee without the MPC",
         ),
-        TeleopMode(
-            "ee_dls_base",
-            always("hand"),
-            "dls_base",
-            "steer the hand; damped least squares with ee's weights: ee without horizon and distances",
-        ),
-        TeleopMode(
-            "ee_mink",
-            always("hand"),
-            "handrail.collect.world.mink:MINK",
-            "steer the hand; whole-body inverse kinematics that keeps distances: ee without horizon",
-            module="mink",
-        ),
-        TeleopMode(
-            "ee_one_stage", always("hand"), "mpc_one_stage", "steer the hand: ee with a horizon of one stage"
-        ),
         TeleopMode("base", always("base"), "mpc", "steer the base; the arm keeps clear by itself"),
         TeleopMode("base+ee", always("base", "hand"), "mpc", "steer base and hand at once"),
         TeleopMode("joints", always("joint"), "mpc", "steer every joint, kept safe by the MPC"),
@@ -176,6 +160,23 @@ MODES = Registry(
             "mpc",
             "steer the hand and the joints that carry all arms",
             hands=2,
+        ),
+        # LeRobot's plugin writes a mode as its place here: new ones come last
+        TeleopMode(
+            "ee_dls_base",
+            always("hand"),
+            "dls_base",
+            "steer the hand; damped least squares with ee's weights: ee without horizon and distances",
+        ),
+        TeleopMode(
+            "ee_mink",
+            always("hand"),
+            "handrail.collect.world.mink:MINK",
+            "steer the hand; whole-body inverse kinematics that keeps distances: ee without horizon",
+            module="mink",
+        ),
+        TeleopMode(
+            "ee_one_stage", always("hand"), "mpc_one_stage", "steer the hand: ee with a horizon of one stage"
         ),
     ),
 )
