@@ -178,5 +178,12 @@ MODES = Registry(
         TeleopMode(
             "ee_one_stage", always("hand"), "mpc_one_stage", "steer the hand: ee with a horizon of one stage"
         ),
+        TeleopMode(
+            "direct_erring",
+            always("base", "arm"),
+            "direct",
+            "direct_single by a script that errs: takes a wrong joint, pushes the wrong way at first",
+            device="single_axis_erring",
+        ),
     ),
 )

@@ -149,8 +149,12 @@ def _shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
 
 
 def whole_body_mink(model: RobotModel, period: float = 0.05) -> MinkController:
-    """Return mink for an operator who steers the hand: chosen on scripted episodes of seeds from 100 on."""
-    return MinkController(model, period, MinkSettings())
+    """Return mink for an operator who steers the hand, with the masked MPC's own weights.
+
+    Of nine settings on 20 scripted episodes each of `reach` and `pick_place` (seed 100) none did better by
+    more than chance; those that may come nearer to shapes in a step touched something in 0 to 2.
+    """
+    return MinkController(model, period, MinkSettings(base=0.00316, posture=0.001, approach=0.25))
 
 
 MINK = ControllerSpec(

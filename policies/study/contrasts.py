@@ -9,15 +9,10 @@ import numpy as np
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.replicates import student
 from handrail.policies.study.design import CONTRASTS, Factors, StudyDesign
-from handrail.policies.study.power import weights
+from handrail.policies.study.power import WORDS, weights
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
 DECLARED, EXPLORATORY, SYSTEM = "declared", "exploratory", "system"
-WORDS = {
-    "input": "input: hand − joints",
-    "controller": "controller: MPC − none",
-    "interaction": "interaction: what the MPC adds with the hand − with the joints",
-}
 Parts = Mapping[str, float]  # the weight of each policy's success
 
 
@@ -29,6 +24,7 @@ def contrasts(results: Results) -> list[Contrast]:
     design, tasks = results.progress.design, tuple(results.progress.design.tasks)
     factors = design.factors
     asked = [_factor(factors, name) for name in factors.primary] if factors else []
+    asked += [_pair(each.one, each.other, each.ending) for each in design.pairs]
     declared = [each for one in asked if (each := _contrast(results, DECLARED, tasks, *one))]
     whole = [each for each in declared if each.counts == (design.draws,) != (1,)]
     tested = {each.label: each for each in adjusted(whole)}
@@ -43,6 +39,11 @@ def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) 
     if not factors:
         rivals = [mode for mode in design.modes if mode != design.baseline]
         yield from (ask(*_pair(mode, design.baseline)) for mode in rivals)
+        for each in design.pairs:
+            pair = _pair(each.one, each.other, each.ending)
+            if tasks != tuple(design.tasks) and (each.other, each.budget) != (design.baseline, "time"):
+                yield ask(*pair)
+            yield ask(*pair, "clean")
         yield from _systems(results, design, tasks)
         return
     for name in CONTRASTS:

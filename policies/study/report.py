@@ -11,15 +11,16 @@ from handrail.datasets.presentation.drawing import png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.markup import panels
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.statistics.contrast import Contrast
+from handrail.datasets.statistics.contrast import LEVEL, Contrast
+from handrail.datasets.statistics.replicates import equivalence_p
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.study import tables
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.contrasts import DECLARED, WORDS, contrasts
-from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.contrasts import DECLARED, contrasts
+from handrail.policies.study.design import Pair, StudyDesign
 from handrail.policies.study.figures import CAPTIONS, figures
-from handrail.policies.study.power import plan
+from handrail.policies.study.power import WORDS, plan
 from handrail.policies.study.progress import StudyProgress, designs
 from handrail.policies.study.results import Results, gather
 
@@ -134,10 +135,27 @@ def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
     """Return the headline, a sentence each: the interaction first, as means over what differs mislead."""
     declared = {each.label: each for each in found if each.family == DECLARED}
     if declared:
-        return [_told(declared[name]) for name in reversed(WORDS.values()) if name in declared]
-    if design.factors and design.factors.primary:
-        return ["No draw has all cells of the 2 × 2 on all tasks yet: nothing can be said."]
+        names = [each.label for each in design.pairs] or reversed(WORDS.values())
+        told = [_told(declared[name]) for name in names if name in declared]
+        return told + [
+            _equivalent(declared[each.label], each)
+            for each in design.pairs
+            if each.label in declared and each.margin
+        ]
+    if design.pairs or (design.factors and design.factors.primary):
+        return ["No draw has all that is declared on all tasks yet: nothing can be said."]
     return ["No contrast was declared before the run: what is shown explores, and nothing is tested."]
+
+
+def _equivalent(found: Contrast, pair: Pair) -> str:
+    """Return whether two modes are equivalent, which is not said before all draws are done."""
+    p = equivalence_p(found, pair.margin) if found.p_adjusted is not None else None
+    verdict = (
+        "not tested before all draws are done"
+        if p is None
+        else f"{'' if p < LEVEL else 'not '}shown, p {p:.2g}"
+    )
+    return f"Equivalence of {pair.label} within {100 * pair.margin:g} points: {verdict}."
 
 
 def _told(each: Contrast) -> str:

@@ -19,7 +19,7 @@ from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 PRESETS = Path(__file__).parent / "presets"
 BATCH = 10  # episodes, until the next person has a turn
-_FPS = 20  # [Hz]
+FPS = 20  # [Hz]
 _DATASET, _POLICY = Path("dataset"), Path("policy")  # of settings that are only looked at
 _RECORDED = ("task", "mode", "noise", "time_limit", "seed")
 _LEARNT = (
@@ -55,18 +55,21 @@ def seed_of(design: StudyDesign, cell: StudyCell) -> int:
     return MOST_DRAWS * design.seed + cell.draw
 
 
-def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
-    """Return how the next turn of a dataset is recorded, `so_far` episodes being in it."""
+def recording(
+    cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0, share: float = 0.0
+) -> RecordConfig:
+    """Return how the next turn of a dataset is recorded, `so_far` episodes being in it, a share of all."""
     return RecordConfig(
         task=cell.task,
-        mode=cell.mode,
+        mode=cell.mode_at(share),
         person=1 + cell.draw * design.persons + so_far // BATCH % design.persons,
         seed=seed_of(design, cell),
+        time_limit=design.tasks[cell.task].time_limit,
         dataset=DatasetConfig(
             repo_id=f"study/{cell.task}-{cell.mode}",
             root=str(root),
             num_episodes=BATCH - so_far % BATCH,
-            fps=_FPS,
+            fps=FPS,
         ),
         resume=root.exists(),
         workers=1,  # a job has one core
@@ -76,9 +79,9 @@ def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0)
 def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
     """Return how a policy is trained."""
     task, timed, flat = design.tasks[policy.cell.task], policy.budget == "time", design.flat
-    ended: dict[str, Any] = {}
+    ended: dict[str, Any] = {"save_freq": design.curve[0]} if design.curve else {}
     if flat:
-        ended = {"eval_split": flat.held_out, "eval_steps": flat.every}
+        ended |= {"eval_split": flat.held_out, "eval_steps": flat.every}
         ended |= {"patience": flat.patience, "improvement": flat.improvement}
     return TrainConfig(
         dataset=StoredConfig(root=str(dataset)),
@@ -90,7 +93,7 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
         batch_size=task.batch_size,
         seed=policy.cell.draw,
         draw=policy.cell.draw,
-        minutes=task.minutes if timed else 0.0,
+        minutes=(policy.minutes or task.minutes) if timed else 0.0,
         episodes=0 if timed else task.episodes,
         encoder=design.encoders.get(policy.cell.task, ""),
         resume=True,
@@ -110,6 +113,10 @@ def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> d
         "workers": 1,  # a job has one core
     }
     found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
+    for updates in design.curve if policy == StudyPolicy(policy.cell) else ():
+        place = Path(folder).parent.parent / f"{updates:06d}" / Path(folder).name
+        here = {"policy": (str(place),), "label": f"{policy.label} {after(updates)}"}
+        found[f"after-{updates}"] = EvaluateConfig(episodes=design.rollouts, **common | here)
     if job.robust and more:
         common["episodes"] = min(design.rollouts, more.rollouts)
         if more.perturbations:
@@ -118,6 +125,11 @@ def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> d
         if protections := [each for each in more.protections if (each == "none") == is_intent]:
             found["protected"] = EvaluateConfig(protection=",".join(protections), **common)
     return found
+
+
+def after(updates: int) -> str:
+    """Return what rollouts are called of a policy that has learnt less than it will."""
+    return f"after {updates} updates"
 
 
 def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
@@ -129,6 +141,7 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     cell = job.cell
     config, task = recording(cell, design, _DATASET), design.tasks[cell.task]
     recorded = _some(config, _RECORDED) | {
+        "mode": cell.mode,
         "persons": design.persons,
         "turn": BATCH,
         "fps": config.dataset.fps,
@@ -138,6 +151,8 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
         return found
     learnt = training(job.policy, design, _DATASET, _POLICY)
     trained = _some(learnt, _LEARNT)
+    if design.curve and job.policy == StudyPolicy(cell):  # of what is done the checkpoints are gone
+        trained |= {"curve": list(design.curve)}
     if learnt.encoder:
         from handrail.policies.imitation.interface.encoder import find_encoder
 

@@ -13,8 +13,8 @@ from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.contrast import Contrast
-from handrail.policies.study.contrasts import CONTRASTS, DECLARED, EXPLORATORY, SYSTEM, WORDS
-from handrail.policies.study.power import detectable
+from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM
+from handrail.policies.study.power import planned
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
 _TITLES = {
@@ -41,10 +41,10 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
     design = results.progress.design
     columns, more = ["group", "of", "measure", "difference", "95 %", "n"], {}
     if kind == DECLARED:
-        names = CONTRASTS if design.factors and design.draws > 1 else ()
-        planned = {WORDS[name]: f"{100 * detectable(design, name):.0f} points" for name in names}
+        expected = planned(design) if design.draws > 1 else {}
+        shown = {name: f"{100 * points:.0f} points" for name, points in expected.items()}
         columns += ["p", "p, Holm", "detectable"]
-        more["detectable, as planned"] = lambda each: planned.get(each.label, DASH)
+        more["detectable, as planned"] = lambda each: shown.get(each.label, DASH)
     chosen = [each for each in found if each.family == kind]
     caption = "n: draws" + ("; detectable: from the spread seen" if more else "")
     return contrast_table(chosen, columns, _TITLES[kind], caption, more)
@@ -130,7 +130,7 @@ def treatments_table(task: str, results: Results) -> Table:
     """Return disturbed and protected policies beside the same rollouts without."""
     headings = ("policy", "treatment", "success", "without it", "points", "points 95 %", "contact")
     rows = [_treatment(each, results) for each in results.of_task(task, treated=True)]
-    title = "Disturbed, or otherwise protected; beside the same policies in the same scenes without it"
+    title = "Disturbed, otherwise protected, or of fewer updates; beside the same scenes without it"
     return Table((*headings, "without it"), rows, title)
 
 

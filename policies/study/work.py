@@ -21,8 +21,8 @@ from handrail.datasets.storage.atomic import remove
 from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.study.design import StudyDesign
-from handrail.policies.study.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
-from handrail.policies.study.settings import evaluations, fingerprint, recording, training
+from handrail.policies.study.jobs import StudyCell, StudyJob, StudyLayout, StudyPolicy
+from handrail.policies.study.settings import FPS, evaluations, fingerprint, recording, training
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
 
@@ -93,10 +93,11 @@ def _stale(
     if job.policy is None:
         return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
     policy, driven = job.policy, before.get("evaluations", {})
+    known = now["evaluations"] | driven
     if any(now[part] != before.get(part) for part in ("recording", "wanted", "training")):
-        return [layout.policy(policy), *(layout.evaluation(policy, what) for what in CONDITIONS)]
+        return [layout.policy(policy), *(layout.evaluation(policy, what) for what in known)]
     gone = last_checkpoint(layout.policy(policy)) is None
-    others = [what for what in CONDITIONS if gone or now["evaluations"].get(what) != driven.get(what)]
+    others = [what for what in known if gone or now["evaluations"].get(what) != driven.get(what)]
     return [layout.evaluation(policy, what) for what in others]
 
 
@@ -122,9 +123,10 @@ def collect(cell: StudyCell, design: StudyDesign, root: Path) -> None:
     wanted = design.tasks[cell.task]
     while True:
         rows = read_episodes(root) if root.exists() else []
-        config = recording(cell, design, root, len(rows))
+        minutes = sum(row["length"] for row in rows) / FPS / 60.0
         successes = sum(bool(row["success"]) for row in rows)
-        minutes = sum(row["length"] for row in rows) / config.dataset.fps / 60.0
+        share = min(minutes / wanted.minutes, successes / wanted.episodes)
+        config = recording(cell, design, root, len(rows), share)
         if successes >= wanted.episodes and minutes >= wanted.minutes:
             return
         if len(rows) >= _MOST_ATTEMPTS * wanted.episodes and successes < wanted.episodes:
