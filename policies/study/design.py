@@ -122,7 +122,7 @@ class Factors:
 
 
 @dataclass(frozen=True)
-class Pair:
+class DeclaredPair:
     """Two modes whose difference is tested; explained above."""
 
     one: str
@@ -177,7 +177,7 @@ class StudyDesign:
     seed: Annotated[int, Meta(ge=0, le=10**5)] = 0
     curve: tuple[AtLeastOne, ...] = ()
     flat: Flat | None = None
-    pairs: tuple[Pair, ...] = ()
+    pairs: tuple[DeclaredPair, ...] = ()
     factors: Factors | None = None
     beside: Beside | None = None
     encoders: Mapping[str, str] = field(default_factory=dict)

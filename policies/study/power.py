@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.datasets.statistics.contrast import reach
 from handrail.datasets.statistics.replicates import equivalence_power
-from handrail.policies.study.design import CONTRASTS, Factors, Pair, StudyDesign
+from handrail.policies.study.design import CONTRASTS, DeclaredPair, Factors, StudyDesign
 
 _WORST = 0.25  # variance of a rollout's success: of one that succeeds in half of all cases
 WORDS = {
@@ -90,7 +90,7 @@ def plan(design: StudyDesign) -> str:
     return f"{told}; one contrast of one task by itself, which is exploratory: {single}."
 
 
-def _equivalence(design: StudyDesign, pair: Pair) -> str:
+def _equivalence(design: StudyDesign, pair: DeclaredPair) -> str:
     if not pair.margin:
         return ""
     power = equivalence_power(pair.margin, standard_error(design, pair.sd, 2.0), design.draws - 1)

@@ -18,7 +18,7 @@ from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.study import tables
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.contrasts import DECLARED, contrasts
-from handrail.policies.study.design import Pair, StudyDesign
+from handrail.policies.study.design import DeclaredPair, StudyDesign
 from handrail.policies.study.figures import CAPTIONS, figures
 from handrail.policies.study.power import WORDS, plan
 from handrail.policies.study.progress import StudyProgress, designs
@@ -147,7 +147,7 @@ def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
     return ["No contrast was declared before the run: what is shown explores, and nothing is tested."]
 
 
-def _equivalent(found: Contrast, pair: Pair) -> str:
+def _equivalent(found: Contrast, pair: DeclaredPair) -> str:
     """Return whether two modes are equivalent, which is not said before all draws are done."""
     p = equivalence_p(found, pair.margin) if found.p_adjusted is not None else None
     verdict = (

@@ -17,9 +17,9 @@ from handrail.policies.study import design as design_module
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import (
     Beside,
+    DeclaredPair,
     Factors,
     Flat,
-    Pair,
     Robustness,
     StudyDesign,
     TaskDesign,
@@ -93,7 +93,7 @@ def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(tmp_path,
 
 def test_every_setting_of_a_design_is_explained_where_people_look():
     written = design_module.__doc__ or ""
-    for kind in (StudyDesign, TaskDesign, Flat, Factors, Pair, Beside, Robustness):
+    for kind in (StudyDesign, TaskDesign, Flat, Factors, DeclaredPair, Beside, Robustness):
         for entry in dataclasses.fields(kind):
             described = f"\n{entry.name} = " in written or f"[{entry.name}" in written
             assert described or entry.name in ("name", "digest"), entry.name

@@ -13,7 +13,7 @@ from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.training import presets
 from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import Flat, Pair
+from handrail.policies.study.design import DeclaredPair, Flat
 from handrail.policies.study.jobs import StudyCell, jobs
 from handrail.policies.study.progress import StudyProgress
 from handrail.policies.study.settings import evaluations, fingerprint, load_design, recording, training
@@ -92,7 +92,7 @@ def test_every_setting_of_the_design_is_part_of_what_something_depends_on(preset
     )]  # fmt: skip
     assert all(prints(other) != prints(design) for other in others)
     assert len({str(prints(other)) for other in others}) == len(others)
-    same = {"name": "other", "baseline": "ee", "pairs": (Pair("ee", "direct"),)}
+    same = {"name": "other", "baseline": "ee", "pairs": (DeclaredPair("ee", "direct"),)}
     assert prints(dataclasses.replace(design, **same)) == prints(design)
 
 

@@ -20,7 +20,7 @@ from handrail.datasets.statistics.replicates import (
 )
 from handrail.policies.study import tables
 from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
-from handrail.policies.study.design import Flat, Pair, Robustness
+from handrail.policies.study.design import DeclaredPair, Flat, Robustness
 from handrail.policies.study.figures import figures
 from handrail.policies.study.power import detectable, plan, weights
 from handrail.policies.study.report import answer, cautions
@@ -127,7 +127,7 @@ def test_what_is_planned_is_detected_in_four_of_five_studies(contrast):
     assert found / studies == pytest.approx(0.8, abs=0.06)
 
 
-PAIRS = (Pair("ee", "decoupled", margin=0.1, sd=0.05), Pair("ee", "direct", "number"))
+PAIRS = (DeclaredPair("ee", "decoupled", margin=0.1, sd=0.05), DeclaredPair("ee", "direct", "number"))
 
 
 def test_pairs_that_are_declared_are_tested_and_no_others(gathered):
