@@ -214,7 +214,7 @@ def test_mink_keeps_its_distance(obstacles, way):
     """Drive the hand into the robot's mount, or what it holds at a wall: plain least squares gets close."""
     pytest.importorskip("mink")
     smallest = {}
-    for rival in (controller("dls"), controller("mink"), MINK.build(MODEL, STEP)):
+    for rival in (controller("dls"), controller("mink"), resolved(MINK.build)(MODEL, STEP)):
         name, q, v = rival, HOME.copy(), REST
         rival.reset(tuple(each for each in obstacles if not each.held))
         for step in range(500):

@@ -1,6 +1,7 @@
 """Where a rollout failed: the furthest stage it came to, and how it ended."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -103,7 +104,7 @@ def test_the_distance_is_told_each_second_and_the_first_contact():
     way = [*[AWAY] * 20, *[AT] * 20, *[OVER] * 5]
     above = PickPlace().aim(OVER)
     expected = [0.5, 1.5 * WIDTH, np.linalg.norm(OVER.tool.position - above.position)]
-    told = watched(way, contacts=(30, 31, 40))
+    told: Any = watched(way, contacts=(30, 31, 40))
     np.testing.assert_allclose(told["distances"], expected, atol=5e-4)
     assert told["first_contact"] == 1.5
     assert watched([AWAY] * 200, Aimless(), contacts=(7,)) == {"distances": [], "first_contact": 0.35}

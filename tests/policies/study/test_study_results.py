@@ -155,7 +155,7 @@ def test_pairs_that_are_declared_are_tested_and_no_others(gathered):
     assert "within 10 points: shown, p 0.0" in answer(contrasts(like), design)[-1]
     text = plan(design)
     assert "Declared: ee − decoupled, ee − direct (same number), over reach, tray together." in text
-    assert tables.contrasts_table(found, DECLARED, results).rows[0][-1].endswith("points")
+    assert str(tables.contrasts_table(found, DECLARED, results).rows[0][-1]).endswith("points")
 
 
 def test_equivalence_is_found_as_often_as_planned_and_rarely_where_there_is_none():
