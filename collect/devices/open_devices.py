@@ -109,7 +109,7 @@ def _led(modes: Mapping[str, TeleopMode], env: HandrailEnv, first: str) -> dict[
     fit = {
         name: mode
         for name, mode in modes.items()
-        if mode.device != "single_axis" and channels.mask(*mode.owned("hand"))[arm].all()
+        if not mode.device.startswith("single_axis") and channels.mask(*mode.owned("hand"))[arm].all()
     }
     if first not in fit:
         raise HandrailError(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from typing import Literal
 
 from handrail.controllers.errors import HandrailError
@@ -25,6 +26,12 @@ class TeleopMode:
     """Whether the masked MPC takes on the objectives that a task brings, and the channels that the
     operator then leaves to them."""
     hands: int = 1  # how many hands a robot needs for it
+    module: str = ""  # that has to be installed besides
+
+    @property
+    def available(self) -> bool:
+        """Whether everything that it needs is installed."""
+        return not self.module or find_spec(self.module) is not None
 
     def owned(self, focus: Focus, hand: str = "") -> tuple[str, ...]:
         """Return the channel groups that the operator owns; `hand` is the one of several that is meant."""
@@ -154,6 +161,7 @@ MODES = Registry(
             "steer the hand and the joints that carry all arms",
             hands=2,
         ),
+        # LeRobot's plugin writes a mode as its place here: new ones come last
         TeleopMode(
             "ee_filtered", always("hand"), "filter", "steer the hand, through the multi-step safety filter"
         ),
@@ -163,6 +171,29 @@ MODES = Registry(
             always("hand"),
             "blended",
             "steer the hand; an actor that knows the goal weighs as much, while you move",
+        ),
+        TeleopMode(
+            "ee_dls_base",
+            always("hand"),
+            "dls_base",
+            "steer the hand; damped least squares with ee's weights: ee without horizon and distances",
+        ),
+        TeleopMode(
+            "ee_mink",
+            always("hand"),
+            "handrail.collect.world.mink:MINK",
+            "steer the hand; whole-body inverse kinematics that keeps distances: ee without horizon",
+            module="mink",
+        ),
+        TeleopMode(
+            "ee_one_stage", always("hand"), "mpc_one_stage", "steer the hand: ee with a horizon of one stage"
+        ),
+        TeleopMode(
+            "direct_erring",
+            always("base", "arm"),
+            "direct",
+            "direct_single by a script that errs: takes a wrong joint, pushes the wrong way at first",
+            device="single_axis_erring",
         ),
     ),
 )

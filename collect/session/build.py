@@ -151,7 +151,8 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
 def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:
     """Return the modes that a person can change to, by name: all for the robot, and that of the settings."""
     fit = fitting(MODES, len(env.model.description.hands))
-    modes = [build_mode(replace(config, mode=name, mask=""), env.model) for name in fit]
+    there = [name for name, mode in fit.items() if mode.available]
+    modes = [build_mode(replace(config, mode=name, mask=""), env.model) for name in there]
     channels, hand = Channels.of(env.model.description), env.model.hand.name
     known = [
         mode

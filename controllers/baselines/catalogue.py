@@ -20,11 +20,14 @@ class ControllerSpec:
     """Whether `build` also takes what robot and task bring, `(model, period, objectives)`."""
 
 
-def _mpc(kind: str) -> Callable[..., Any]:
-    """Return what builds a kind of the masked MPC, `module:name`."""
+def _mpc(kind: str, **settings: float) -> Callable[..., Any]:
+    """Return what builds a kind of the masked MPC, `module:name`, with some settings of its own."""
 
     def build(model: Any, period: float, objectives: tuple[Any, ...]) -> Any:
-        mpc = resolved(f"{_HERE}.mpc.{kind}")(model, objectives=objectives)
+        from handrail.controllers.ocp.settings import MpcSettings
+
+        settings_of = MpcSettings.of(model.description.world.scale, **settings)
+        mpc = resolved(f"{_HERE}.mpc.{kind}")(model, settings_of, objectives)
         mpc.settings.check_period(period, "control rate [Hz]")
         return mpc
 
@@ -44,11 +47,23 @@ CONTROLLERS = Registry(
             protects=True,
             objectives=True,
         ),
+        ControllerSpec(
+            "mpc_one_stage",
+            _mpc("masked_mpc:MaskedMpc", horizon=1),
+            "the masked MPC without its horizon: one stage",
+            protects=True,
+            objectives=True,
+        ),
         ControllerSpec("direct", f"{_HERE}.baselines.direct:DirectController", "clipped to joint limits"),
         ControllerSpec(
             "dls",
             f"{_HERE}.baselines.twist_completion:least_squares_controller",
             "damped least squares of the whole body, clipped to joint limits",
+        ),
+        ControllerSpec(
+            "dls_base",
+            f"{_HERE}.baselines.twist_completion:base_first_controller",
+            "damped least squares with the masked MPC's weights: the base before the arm",
         ),
         ControllerSpec(
             "filter", f"{_HERE}.mpc.safety_filter:safety_filter", "multi-step safety filter", protects=True

@@ -10,6 +10,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import Pose, RobotModel
 
 Completion = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
@@ -25,11 +26,13 @@ class WholeBodyCompletion:
     Args:
         model: of the robot.
         damping: λ.
+        weights: the diagonal of λ W² instead, (n,).
     """
 
-    def __init__(self, model: RobotModel, damping: float = 0.01) -> None:
+    def __init__(self, model: RobotModel, damping: float = 0.01, weights: FloatArray | None = None) -> None:
         self._model = model
-        self._inverse = model.description.limits.velocity**2 / damping  # of λ W², (n,)
+        usual = model.description.limits.velocity**2 / damping
+        self._inverse = usual if weights is None else 1.0 / weights  # of λ W², (n,)
 
     def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:
         """Return the velocity, (n,)."""
@@ -77,12 +80,19 @@ class TwistController(ReactiveController):
         model: of the robot.
         complete: the rule.
         period: of the control loop [s].
+        margins: that the rule keeps, as of `ReactiveController` [m].
     """
 
-    def __init__(self, model: RobotModel, complete: Completion, period: float = 0.05) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        complete: Completion,
+        period: float = 0.05,
+        margins: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
         self._complete = complete
         understood = Channels.of(model.description).mask(model.hand.name or "ee")
-        super().__init__(model, self._completed, period, understood)
+        super().__init__(model, self._completed, period, understood, margins)
 
     def _completed(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         if not intent.mask.any():
@@ -101,6 +111,19 @@ def least_squares_controller(model: RobotModel, period: float = 0.05) -> TwistCo
         period: of the control loop [s].
     """
     return TwistController(model, WholeBodyCompletion(model), period)
+
+
+def base_first_controller(model: RobotModel, period: float = 0.05) -> TwistController:
+    """Return `least_squares_controller` with the masked MPC's own weights: it moves the base before the arm.
+
+    Args:
+        model: of the robot.
+        period: of the control loop [s].
+    """
+    settings = MpcSettings.of(model.description.world.scale)
+    arm = np.arange(model.size) >= len(model.description.base.joints)
+    weights = np.where(arm, settings.arm_velocity, settings.base_velocity) / settings.tracking
+    return TwistController(model, WholeBodyCompletion(model, weights=weights), period)
 
 
 def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ _LENGTHS = ("margin", "work_margin", "activation_distance", "largest_speed", "le
 class MpcSettings:
     """Settings of the masked MPC; weights are per squared unit of their residual."""
 
-    horizon: Annotated[int, Meta(ge=2)] = 10  # stages N
+    horizon: Annotated[int, Meta(ge=1)] = 10  # stages N
     dt: Positive = 0.1  # length of a stage [s]
     decay: Annotated[float, Meta(gt=0, le=1)] = 0.9  # γ; stage k tracks the intent with weight γᵏ
     tracked_stages: Count = 0  # stages M at which the intent is tracked; 0 for all

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import stats
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.statistics.contrast import Estimate
+from handrail.datasets.statistics.contrast import LEVEL, Estimate
 from handrail.datasets.statistics.resampling import Interval, Run
 
 _SUCCESSES, _TRIALS = 2.0, 4.0  # added, so that a share is never quite 0 or 1 (Agresti and Coull)
@@ -98,6 +98,26 @@ def student(values: FloatArray | Sequence[float], least: float) -> Estimate:
     return Estimate(
         estimate=mean, interval=interval, p=p, counts=(count,), errors=((error, count - 1),), paired=True
     )
+
+
+def equivalence_p(found: Estimate, margin: float) -> float | None:
+    """Return the larger p of two one-sided t tests that a difference is nearer to 0 than a margin (TOST).
+
+    `P(T > (margin − |d|) / s)`: Schuirmann 1987. None where no error is known.
+    """
+    if not found.errors or found.estimate is None:
+        return None
+    error, freedom = found.errors[0]
+    return float(stats.t.sf((margin - abs(found.estimate)) / error, freedom))
+
+
+def equivalence_power(margin: float, error: float, freedom: float) -> float:
+    """Return how often `equivalence_p` is below 0.05 where there is no difference.
+
+    `2 F(margin / s − t_0.95) − 1`, F of Student's t: approximately, as s is taken for known.
+    """
+    beyond = margin / error - float(stats.t.ppf(1.0 - LEVEL, freedom))
+    return max(0.0, 2.0 * float(stats.t.cdf(beyond, freedom)) - 1.0)
 
 
 def variance_of_share(successes: float, trials: int, each: float) -> float:

@@ -1,6 +1,6 @@
 """What is compared: the contrasts that were declared before the run, and all others, which only explore."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -9,17 +9,11 @@ import numpy as np
 
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.replicates import student
-from handrail.policies.study.design import CONTRASTS, Factors, Rounds, StudyDesign
-from handrail.policies.study.power import weights
+from handrail.policies.study.declared import Parts, declared, of_factors, of_pair, of_ways
+from handrail.policies.study.design import CONTRASTS, StudyDesign
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
 DECLARED, EXPLORATORY, SYSTEM = "declared", "exploratory", "system"
-WORDS = {
-    "input": "input: hand − joints",
-    "controller": "controller: MPC − none",
-    "interaction": "interaction: what the MPC adds with the hand − with the joints",
-}
-Parts = Mapping[str, float]  # the weight of each policy's success
 
 
 def contrasts(results: Results) -> list[Contrast]:
@@ -28,65 +22,49 @@ def contrasts(results: Results) -> list[Contrast]:
     Nothing is tested before all draws are there: who looks in between and stops where it suits finds more.
     """
     design, tasks = results.progress.design, tuple(results.progress.design.tasks)
-    factors = design.factors
-    asked = [_factor(factors, name) for name in factors.primary] if factors else []
-    if rounds := design.rounds:
-        asked = [_after(rounds, pair, rounds.count) for pair in rounds.primary]
-    declared = [each for one in asked if (each := _contrast(results, DECLARED, tasks, *one))]
-    whole = [each for each in declared if each.counts == (design.draws,) != (1,)]
+    asked = [(each.label, each.parts) for each in declared(design)]
+    first = [each for one in asked if (each := _contrast(results, DECLARED, tasks, *one))]
+    whole = [each for each in first if each.counts == (design.draws,) != (1,)]
     tested = {each.label: each for each in adjusted(whole)}
-    found = [replace(tested.get(each.label, each), tests=len(asked)) for each in declared]
+    found = [replace(tested.get(each.label, each), tests=len(asked)) for each in first]
     scopes = [*([tasks] if len(tasks) > 1 else []), *((task,) for task in tasks)]
-    explored = [each for scope in scopes for each in _exploratory(results, design, scope) if each]
-    return found + explored
+    found += [each for scope in scopes for each in _exploratory(results, design, scope) if each]
+    once: dict[tuple[str, ...], Contrast] = {}
+    for each in found:
+        once.setdefault((each.label, each.scope, each.measure.name), each)
+    return list(once.values())
 
 
 def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
+    """Yield all that may be of interest, what is declared among it."""
     ask, factors = partial(_contrast, results, EXPLORATORY, tasks), design.factors
     if rounds := design.rounds:
         for number, pair in product(range(1, rounds.count + 1), rounds.pairs):
-            if tasks != tuple(design.tasks) or rounds.words(pair, number) not in rounds.declared:
-                yield ask(*_after(rounds, pair, number))
+            yield ask(*of_ways(pair, number))
             if number == rounds.count:
-                yield ask(*_after(rounds, pair, number), "clean")
+                yield ask(*of_ways(pair, number), "clean")
         for number, way in product(range(1, rounds.count + 1), rounds.ways):
-            yield ask(*_pair(f"{way}-{number} intent", f"{design.baseline} intent"))
+            yield ask(*of_pair(f"{way}-{number} intent", f"{design.baseline} intent"))
         return
     if not factors:
         rivals = [mode for mode in design.modes if mode != design.baseline]
-        yield from (ask(*_pair(mode, design.baseline)) for mode in rivals)
+        yield from (ask(*of_pair(mode, design.baseline)) for mode in rivals)
+        for each in declared(design):
+            yield ask(each.label, each.parts)
+            yield ask(each.label, each.parts, "clean")
         yield from _systems(results, design, tasks)
         return
     for name in CONTRASTS:
-        if tasks != tuple(design.tasks) or name not in factors.primary:
-            yield ask(*_factor(factors, name))
+        yield ask(*of_factors(factors, name))
     for pair in factors.pairs:
-        yield ask(*_pair(*pair))
-        yield ask(*_pair(*pair), "clean")
-        yield ask(*_pair(*pair, " same number"))
+        yield ask(*of_pair(*pair))
+        yield ask(*of_pair(*pair), "clean")
+        yield ask(*of_pair(*pair, " same number"))
     yield from _systems(results, design, tasks)
     for name in CONTRASTS:
-        yield ask(*_factor(factors, name, " same number"))
-        yield ask(*_factor(factors, name), "contact")
-        yield ask(*_factor(factors, name), "clean")
-
-
-def _factor(factors: Factors, name: str, ending: str = "") -> tuple[str, Parts]:
-    parts = {f"{mode}{ending}": weight for mode, weight in weights(factors, name).items()}
-    return f"{WORDS[name]}{_bracketed(ending)}", parts
-
-
-def _after(rounds: Rounds, pair: tuple[str, str], number: int) -> tuple[str, Parts]:
-    one, other = (f"{way}-{number} intent" for way in pair)
-    return rounds.words(pair, number), {one: 1.0, other: -1.0}
-
-
-def _pair(one: str, other: str, ending: str = "") -> tuple[str, Parts]:
-    return f"{one} − {other}{_bracketed(ending)}", {f"{one}{ending}": 1.0, f"{other}{ending}": -1.0}
-
-
-def _bracketed(ending: str) -> str:
-    return f" ({ending.strip()})" if ending else ""
+        yield ask(*of_factors(factors, name, " same number"))
+        yield ask(*of_factors(factors, name), "contact")
+        yield ask(*of_factors(factors, name), "clean")
 
 
 def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:

@@ -1,6 +1,6 @@
 """What a study consists of: modes, tasks and draws, as a TOML file says; light to import.
 
-modes = ["ee", "direct"]        teleop modes
+modes = ["ee", "direct"]        teleop modes; ee_and_leader: the first half of the minutes ee, then leader
 baseline = "direct"             the mode that the others are compared with
 policy = "act"                  that LeRobot has registered
 draws = 8                       replicates: each a fresh recording with persons of its own, a training seed,
@@ -8,6 +8,8 @@ draws = 8                       replicates: each a fresh recording with persons 
 rollouts = 50                   of each policy
 persons = 5                     scripted operators of a recording, who take turns
 seed = 0                        of everything: another seed is another study of the same kind
+curve = [5000, 10000]           optional: what policies have learnt after fewer updates drives, too; multiples
+                                of the first
 
 [tasks.reach]
 minutes = 10.0                  of the operator's time in each mode, failed attempts included
@@ -15,6 +17,8 @@ episodes = 50                   successful demonstrations in each mode, at least
 steps = 4000                    updates of each policy; the most there may be where there is a [flat]
 batch_size = 0                  samples an update; 0 for the preset's
 rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
+time_limit = 60.0               of a demonstration [s]; the task's own without it
+sizes = [3.0, 5.0]              optional, exploratory: more policies, of only so many of the minutes
 round_minutes = 0.0             with [rounds]: of the operator's time in each way in each round
 
 [flat]                          optional: train until the loss on held-out episodes is flat, one rule for all
@@ -31,10 +35,18 @@ joint_none = "direct"
 primary = ["input", "controller", "interaction"]        declared before the run, tested; [] for none
 sd = 0.1                        of a policy's success from draw to draw, for the power
 
+[[pairs]]                       optional: success of one mode − another, declared before the run, tested
+one = "ee"
+other = "direct"
+budget = "number"               of policies of the same number of demonstrations, as in [beside]; else "time"
+margin = 0.1                    optional: whether they are equivalent, nearer than this, is tested too
+sd = 0.1                        as in [factors]
+
 [beside]                        optional, exploratory: more policies
 intents = ["ee"]                of these modes also the operator's intent is learnt, completed when it drives
 draws = 2                       on the first so many draws
 same_number = 1                 draws of which policies also learn from `episodes` demonstrations each
+numbered = ["ee", "direct"]     of these modes; of all without it
 
 [encoders]                      optional: policies look through these, one a task, when they drive: nobody
 reach = "ridgeback_ur10-reach"  tells them where things are
@@ -70,6 +82,7 @@ from handrail.controllers.typed import AtLeastOne, Count
 
 CONTRASTS = ("input", "controller", "interaction")
 MOST_DRAWS = 1000
+MIXED = "_and_"  # between the modes of a recording that has several
 _Few = Annotated[int, Meta(ge=1, le=MOST_DRAWS)]
 _Draws = Annotated[int, Meta(ge=0, le=MOST_DRAWS)]
 
@@ -83,6 +96,8 @@ class TaskDesign:
     steps: AtLeastOne = 4000
     batch_size: Count = 0
     rollout_limit: float = 0.0
+    time_limit: float = 0.0
+    sizes: tuple[float, ...] = ()
     round_minutes: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
 
 
@@ -120,12 +135,24 @@ class Factors:
 
 
 @dataclass(frozen=True)
+class DeclaredPair:
+    """Two modes whose difference is tested; explained above."""
+
+    one: str
+    other: str
+    budget: Literal["time", "number"] = "time"
+    margin: float = 0.0
+    sd: float = 0.1
+
+
+@dataclass(frozen=True)
 class Beside:
     """More policies than the main design has; explained above."""
 
     intents: tuple[str, ...] = ()
     draws: _Draws = 0
     same_number: _Draws = 0
+    numbered: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -156,20 +183,11 @@ class Rounds:
     primary: tuple[tuple[str, str], ...] = ()
     sd: float = 0.1
 
-    def words(self, pair: tuple[str, str], number: int) -> str:
-        """Return what two ways are compared in after a round."""
-        return f"{' − '.join(pair)} after round {number}"
-
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """All pairs of ways, those that are tested as they are declared."""
         found = combinations(self.ways, 2)
         return [(two, one) if (two, one) in self.primary else (one, two) for one, two in found]
-
-    @property
-    def declared(self) -> dict[str, tuple[str, str]]:
-        """The pairs that are tested, by their words."""
-        return {self.words(pair, self.count): pair for pair in self.primary}
 
 
 @dataclass(frozen=True)
@@ -185,7 +203,9 @@ class StudyDesign:
     rollouts: Count = 100
     persons: _Few = 5
     seed: Annotated[int, Meta(ge=0, le=10**5)] = 0
+    curve: tuple[AtLeastOne, ...] = ()
     flat: Flat | None = None
+    pairs: tuple[DeclaredPair, ...] = ()
     factors: Factors | None = None
     beside: Beside | None = None
     rounds: Rounds | None = None
@@ -201,7 +221,7 @@ class StudyDesign:
                 f"study {self.name}: expected {wanted} and a task, "
                 f"got {', '.join(self.modes) or 'no mode'}; {', '.join(self.tasks) or 'no task'}"
             )
-        check_known("mode", self.modes, MODES)
+        check_known("mode", (part for mode in self.modes for part in mode.split(MIXED)), MODES)
         check_known("task", self.tasks, TASKS)
         check_known("baseline", (self.baseline,), self.modes)
         if self.encoders and self.encoders.keys() != self.tasks.keys():
@@ -215,8 +235,18 @@ class StudyDesign:
             check_known("mode of the factors", factors.modes, self.modes)
             check_known("contrast", factors.primary, CONTRASTS)
             once |= {"factors": factors.modes, "factors.primary": factors.primary or CONTRASTS}
+        check_known(
+            "mode of a pair", (mode for each in self.pairs for mode in (each.one, each.other)), self.modes
+        )
+        if self.pairs and self.factors and self.factors.primary:
+            raise HandrailError(f"study {self.name}: expected pairs or factors.primary, got both")
+        most = min(task.steps for task in self.tasks.values())
+        if any(updates % self.curve[0] or updates >= most for updates in self.curve):
+            words = f"expected multiples of the first below {most} updates"
+            raise HandrailError(f"study {self.name}: curve {words}, got {self.curve}")
         if beside := self.beside:
-            completed = [mode for mode in self.modes if MODES[mode].controller == "mpc"]
+            completed = [mode for mode in self.modes if mode in MODES and MODES[mode].controller == "mpc"]
+            check_known("mode of same_number", beside.numbered, self.modes)
             check_known("mode of intents, which the MPC completes", beside.intents, completed)
             draws |= {"beside.draws": beside.draws, "beside.same_number": beside.same_number}
         if robust := self.robustness:
@@ -234,17 +264,19 @@ class StudyDesign:
     def _check_rounds(self, rounds: Rounds) -> None:
         """Check that there are ways to compare, and nothing that rounds do not know of."""
         where = f"study {self.name}: rounds"
-        for other in ("flat", "factors", "beside", "encoders", "robustness"):
+        for other in ("curve", "flat", "pairs", "factors", "beside", "encoders", "robustness"):
             if getattr(self, other):
                 raise HandrailError(f"{where}: expected no {other} beside them")
+        check_known("mode of rounds", self.modes, MODES)
         for way in rounds.ways:
             if not way.isidentifier():
                 raise HandrailError(f"{where}: expected ways whose names are words, got {way!r}")
         for pair in rounds.primary:
             check_known("way", pair, rounds.ways)
         for task, each in self.tasks.items():
-            if not each.round_minutes:
-                raise HandrailError(f"{where}: expected round_minutes of task {task}, found none")
+            if not each.round_minutes or each.sizes:
+                found = f"got sizes {each.sizes}" if each.sizes else "found none"
+                raise HandrailError(f"{where}: expected round_minutes of task {task}, {found}")
 
 
 def check_known(what: str, names: Iterable[str], choices: Iterable[str]) -> None:

@@ -10,6 +10,7 @@ from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figur
 from handrail.datasets.statistics.contrast import Contrast
 from handrail.policies.study.contrasts import DECLARED
 from handrail.policies.study.results import Results, StudyCondition
+from handrail.policies.study.settings import after
 
 _WIDTH = 10.4  # [inch]
 CAPTIONS = {
@@ -20,6 +21,7 @@ CAPTIONS = {
     "rounds": "Success of the policies, which drive alone, against the operator's time so far; lines: 95 %.",
     "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
     "robustness": "Success disturbed and undisturbed.",
+    "updates": "Success after more and more updates: the mean over draws, and 95 %.",
 }
 
 
@@ -27,7 +29,7 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     """Return matplotlib figures by name, see `CAPTIONS`; those for which there is something to show."""
     tasks = [task for task in results.progress.design.tasks if results.of_task(task)]
     curved = [task for task in tasks if any(_curves(each, results) for each in results.of_task(task))]
-    disturbed = [task for task in tasks if results.of_task(task, treated=True)]
+    disturbed = [task for task in tasks if _disturbed(task, results)]
     made: dict[str, Any] = {}
     if any(each.interval and each.family == DECLARED for each in found):
         made["contrasts"] = _contrasts(found)
@@ -39,7 +41,15 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
         made["training"] = _training(curved, results)
     if disturbed:
         made["robustness"] = _robustness(disturbed, results)
+    if tasks and results.progress.design.curve:
+        made["updates"] = _updates(tasks, results)
     return made
+
+
+def _disturbed(task: str, results: Results) -> list[StudyCondition]:
+    """Return what was disturbed or protected; no policies that only have learnt less."""
+    less = {after(updates) for updates in results.progress.design.curve}
+    return [each for each in results.of_task(task, treated=True) if each.treatment not in less]
 
 
 def _panels(tasks: Sequence[str], height: float, **shared: Any) -> tuple[Any, Iterator[tuple[Any, str]]]:
@@ -136,11 +146,34 @@ def _training(tasks: Sequence[str], results: Results) -> Any:
     return figure
 
 
+def _updates(tasks: Sequence[str], results: Results) -> Any:
+    """One panel a task: success of the policies of joint velocities over the updates that they had."""
+    design = results.progress.design
+    figure, panels = _panels(tasks, 3.2, sharey=True)
+    for axes, task in panels:
+        steps = {after(updates): updates for updates in design.curve} | {"": design.tasks[task].steps}
+        for mode in design.modes:
+            shown = {name: found for name in steps if (found := results.find(task, mode, name))}
+            values = np.array(
+                [[found.value.estimate, *(found.value.interval or ())] for found in shown.values()]
+            )
+            if not shown:
+                continue
+            style = _style(next(iter(shown.values())), results) | {"elinewidth": 1.2, "ms": 5}
+            errors = np.abs(values[:, 1:] - values[:, :1]).T * 100
+            axes.errorbar([steps[name] / 1000 for name in shown], 100 * values[:, 0], yerr=errors, **style)
+        axes.set(xlabel="updates [thousand]", ylim=(-3, 103))
+        axes.legend(fontsize=8, frameon=False)
+        tidy(axes)
+    figure.axes[0].set_ylabel("policy success [%], 95 %")
+    return figure
+
+
 def _robustness(tasks: Sequence[str], results: Results) -> Any:
     """One panel a task: success of every condition under every treatment, and of the same draws without."""
     figure, panels = _panels(tasks, 3.2, sharey=True)
     for axes, task in panels:
-        treated = results.of_task(task, treated=True)
+        treated = _disturbed(task, results)
         names = ["", *dict.fromkeys(each.treatment for each in treated)]
         labels = list(dict.fromkeys(each.label for each in treated))
         for place, label in enumerate(labels):

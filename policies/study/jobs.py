@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from handrail.policies.study.design import Rounds, StudyDesign
-
-CONDITIONS = ("nominal", "disturbed", "protected")
+from handrail.policies.study.design import MIXED, Rounds, StudyDesign
 
 
 @dataclass(frozen=True)
@@ -35,6 +33,11 @@ class StudyCell:
         """A name for files and logs: `reach/ee/3`."""
         return f"{self.task}/{self.kind}/{self.draw}"
 
+    def mode_at(self, share: float) -> str:
+        """Return the mode in which is recorded when a share of the whole is there."""
+        modes = self.mode.split(MIXED)
+        return modes[min(int(share * len(modes)), len(modes) - 1)]
+
 
 @dataclass(frozen=True)
 class StudyPolicy:
@@ -43,17 +46,24 @@ class StudyPolicy:
     cell: StudyCell
     actions: Literal["realised", "intent"] = "realised"  # joint velocities, or the operator's intent
     budget: Literal["time", "number"] = "time"  # the same operator's time, or number of demonstrations
+    minutes: float = 0.0  # of the operator's time; 0 for the task's
 
     @property
     def label(self) -> str:
         """Its name in an evaluation: the mode, and its special features."""
         intent = " intent" if self.actions == "intent" else ""
-        return self.cell.kind + intent + (" same number" if self.budget == "number" else "")
+        size = f" {self.minutes:g} min" if self.minutes else ""
+        return self.cell.kind + intent + (" same number" if self.budget == "number" else "") + size
+
+    @property
+    def kind(self) -> str:
+        """What tells it from the other policies of its dataset."""
+        return f"{self.actions}-{self.budget}" + (f"-{self.minutes:g}" if self.minutes else "")
 
     @property
     def name(self) -> str:
         """A name for files and logs."""
-        return f"{self.cell.name}/{self.actions}-{self.budget}"
+        return f"{self.cell.name}/{self.kind}"
 
 
 @dataclass(frozen=True)
@@ -99,12 +109,12 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
     for each in cells:
         yield from map(StudyJob, each)
         yield from (StudyJob(cell, StudyPolicy(cell), robust) for cell in each)
-    if beside is None:
-        return
     for cell in (cell for each in cells for cell in each):
-        if draw < beside.draws and cell.mode in beside.intents:
+        for minutes in design.tasks[cell.task].sizes:
+            yield StudyJob(cell, StudyPolicy(cell, minutes=minutes))
+        if beside and draw < beside.draws and cell.mode in beside.intents:
             yield StudyJob(cell, StudyPolicy(cell, "intent"), robust)
-        if draw < beside.same_number:
+        if beside and draw < beside.same_number and cell.mode in (beside.numbered or design.modes):
             yield StudyJob(cell, StudyPolicy(cell, budget="number"))
 
 
@@ -145,8 +155,8 @@ class StudyLayout:
         return self.root / "policies" / policy.name
 
     def evaluation(self, policy: StudyPolicy, what: str) -> Path:
-        """Return the file of a policy's rollouts: `nominal`, `disturbed` or `protected`."""
-        return self.root / "evaluations" / policy.cell.name / what / f"{policy.actions}-{policy.budget}.json"
+        """Return the file of a policy's rollouts: `nominal`, `disturbed`, `protected`, `after-5000`."""
+        return self.root / "evaluations" / policy.cell.name / what / f"{policy.kind}.json"
 
     def begun(self, job: StudyJob) -> Path:
         """Return the file that says with which settings a job was begun."""

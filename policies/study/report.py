@@ -12,12 +12,14 @@ from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.markup import panels
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import percent
-from handrail.datasets.statistics.contrast import Contrast
+from handrail.datasets.statistics.contrast import LEVEL, Contrast
+from handrail.datasets.statistics.replicates import equivalence_p
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.study import tables
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.contrasts import DECLARED, WORDS, contrasts
+from handrail.policies.study.contrasts import DECLARED, contrasts
+from handrail.policies.study.declared import WORDS, Declared, declared
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.figures import CAPTIONS, figures
 from handrail.policies.study.power import plan
@@ -144,19 +146,32 @@ def _write_page(
 
 def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
     """Return the headline, a sentence each: the interaction first, as means over what differs mislead."""
-    declared = {each.label: each for each in found if each.family == DECLARED}
-    if declared and design.rounds:
-        return [sentence(each, name, _sides(each)) for name, each in declared.items()]
-    if declared:
-        return [_told(declared[name]) for name in reversed(WORDS.values()) if name in declared]
-    if (asked := design.factors or design.rounds) and asked.primary:
-        cells = "cells of the 2 × 2" if design.factors else "ways"
-        return [f"No draw has all {cells} on all tasks yet: nothing can be said."]
-    return ["No contrast was declared before the run: what is shown explores, and nothing is tested."]
+    asked, tested = declared(design), {each.label: each for each in found if each.family == DECLARED}
+    if not asked:
+        return ["No contrast was declared before the run: what is shown explores, and nothing is tested."]
+    if not tested:
+        return ["No draw has all that is declared on all tasks yet: nothing can be said."]
+    if design.rounds:
+        return [sentence(each, name, _sides(each)) for name, each in tested.items()]
+    told = [
+        _told(tested[name]) for name in dict.fromkeys([*reversed(WORDS.values()), *tested]) if name in tested
+    ]
+    return told + [
+        _equivalent(tested[each.label], each) for each in asked if each.margin and each.label in tested
+    ]
 
 
 def _sides(each: Contrast) -> str:
     return " against ".join(percent(side) for side in each.sides or ())
+
+
+def _equivalent(found: Contrast, asked: Declared) -> str:
+    """Return whether both sides are equivalent, which is not said before all draws are done."""
+    p = equivalence_p(found, asked.margin)
+    verdict = "not tested before all draws are done"
+    if p is not None and found.p_adjusted is not None:
+        verdict = f"{'' if p < LEVEL else 'not '}shown, p {p:.2g}"
+    return f"Equivalence of {asked.label} within {100 * asked.margin:g} points: {verdict}."
 
 
 def _told(each: Contrast) -> str:

@@ -160,6 +160,6 @@ def gather(progress: StudyProgress) -> Results:
     return Results(progress, dict(ordered))
 
 
-def _place(policy: StudyPolicy) -> tuple[bool, bool]:
+def _place(policy: StudyPolicy) -> tuple[bool, bool, float]:
     """Sort the main design before what is beside it; else as the jobs come."""
-    return policy.budget == "number", policy.actions != "realised"
+    return policy.budget == "number", policy.actions != "realised", policy.minutes

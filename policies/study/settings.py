@@ -19,7 +19,7 @@ from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 PRESETS = Path(__file__).parent / "presets"
 BATCH = 10  # episodes, until the next person has a turn
-_FPS = 20  # [Hz]
+FPS = 20  # [Hz]
 _ROUND = 2 * 10**8  # between the seeds of two rounds' recordings; more than the largest of a draw
 _DATASET, _POLICY = Path("dataset"), Path("policy")  # of settings that are only looked at
 _RECORDED = ("task", "mode", "noise", "time_limit", "seed")
@@ -70,9 +70,14 @@ def wanted(cell: StudyCell, design: StudyDesign) -> dict[str, float]:
 
 
 def recording(
-    cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0, driver: Path = _POLICY
+    cell: StudyCell,
+    design: StudyDesign,
+    root: Path,
+    so_far: int = 0,
+    driver: Path = _POLICY,
+    share: float = 0.0,
 ) -> RecordConfig:
-    """Return how the next turn of a dataset is recorded, `so_far` episodes being in it.
+    """Return how the next turn of a dataset is recorded.
 
     Args:
         cell: of the dataset.
@@ -80,20 +85,22 @@ def recording(
         root: of the dataset.
         so_far: number of its episodes.
         driver: folder of the policy that drives, where one does.
+        share: of all that is wanted, which is there.
     """
     way = way_of(cell, design)
     beside: dict[str, Any] = {"policy": (str(driver),), "arbiter": way.arbiter} if way.arbiter else {}
     return RecordConfig(
         task=cell.task,
-        mode=cell.rounds[0].mode,
+        mode=cell.rounds[0].mode_at(share),
         operator=way.operator,
         person=1 + cell.draw * design.persons + so_far // BATCH % design.persons,
         seed=seed_of(design, cell) + _ROUND * (len(cell.rounds) - 1),
+        time_limit=design.tasks[cell.task].time_limit,
         dataset=DatasetConfig(
             repo_id=f"study/{cell.task}-{cell.kind}",
             root=str(root),
             num_episodes=BATCH - so_far % BATCH,
-            fps=_FPS,
+            fps=FPS,
         ),
         resume=root.exists(),
         workers=1,  # a job has one core
@@ -104,9 +111,9 @@ def recording(
 def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
     """Return how a policy is trained."""
     task, timed, flat = design.tasks[policy.cell.task], policy.budget == "time", design.flat
-    ended: dict[str, Any] = {}
+    ended: dict[str, Any] = {"save_freq": design.curve[0]} if design.curve else {}
     if flat:
-        ended = {"eval_split": flat.held_out, "eval_steps": flat.every}
+        ended |= {"eval_split": flat.held_out, "eval_steps": flat.every}
         ended |= {"patience": flat.patience, "improvement": flat.improvement}
     return TrainConfig(
         dataset=StoredConfig(root=str(dataset)),
@@ -118,7 +125,7 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
         batch_size=task.batch_size,
         seed=policy.cell.draw,
         draw=policy.cell.draw,
-        minutes=task.minutes if timed and not design.rounds else 0.0,
+        minutes=(policy.minutes or task.minutes) if timed and not design.rounds else 0.0,
         corrections=way_of(policy.cell, design).corrections,
         episodes=0 if timed else task.episodes,
         encoder=design.encoders.get(policy.cell.task, ""),
@@ -139,6 +146,10 @@ def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> d
         "workers": 1,  # a job has one core
     }
     found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
+    for updates in design.curve if policy == StudyPolicy(policy.cell) else ():
+        place = Path(folder).parent.parent / f"{updates:06d}" / Path(folder).name
+        here = {"policy": (str(place),), "label": f"{policy.label} {after(updates)}"}
+        found[f"after-{updates}"] = EvaluateConfig(episodes=design.rollouts, **common | here)
     if job.robust and more:
         common["episodes"] = min(design.rollouts, more.rollouts)
         if more.perturbations:
@@ -149,6 +160,11 @@ def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> d
     return found
 
 
+def after(updates: int) -> str:
+    """Return what rollouts are called of a policy that has learnt less than it will."""
+    return f"after {updates} updates"
+
+
 def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     """Return all settings that a job's result depends on, as JSON has them, nothing left to a preset.
 
@@ -157,6 +173,7 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     """
     cell, config = job.cell, recording(job.cell, design, _DATASET)
     recorded = _some(config, _RECORDED) | {
+        "mode": cell.rounds[0].mode,
         "persons": design.persons,
         "turn": BATCH,
         "fps": config.dataset.fps,
@@ -170,6 +187,8 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
         return found
     learnt = training(job.policy, design, _DATASET, _POLICY)
     trained = _some(learnt, (*_LEARNT, "corrections") if job.before else _LEARNT)
+    if design.curve and job.policy == StudyPolicy(cell):  # of what is done the checkpoints are gone
+        trained |= {"curve": list(design.curve)}
     if learnt.encoder:
         from handrail.policies.imitation.interface.encoder import find_encoder
 

@@ -13,7 +13,8 @@ from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.contrast import Contrast
-from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS
+from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM
+from handrail.policies.study.declared import declared
 from handrail.policies.study.power import detectable
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
@@ -41,9 +42,8 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
     design = results.progress.design
     columns, more = ["group", "of", "measure", "difference", "95 %", "n"], {}
     if kind == DECLARED:
-        titles = {name: name for name in design.rounds.declared} if design.rounds else WORDS
-        asked = titles if (design.factors or design.rounds) and design.draws > 1 else ()
-        planned = {titles[name]: f"{100 * detectable(design, name):.0f} points" for name in asked}
+        asked = declared(design) if design.draws > 1 else []
+        planned = {each.label: f"{100 * detectable(design, each):.0f} points" for each in asked}
         columns += ["p", "p, Holm", "detectable"]
         more["detectable, as planned"] = lambda each: planned.get(each.label, DASH)
     chosen = [each for each in found if each.family == kind]
@@ -150,7 +150,7 @@ def treatments_table(task: str, results: Results) -> Table:
     """Return disturbed and protected policies beside the same rollouts without."""
     headings = ("policy", "treatment", "success", "without it", "points", "points 95 %", "contact")
     rows = [_treatment(each, results) for each in results.of_task(task, treated=True)]
-    title = "Disturbed, or otherwise protected; beside the same policies in the same scenes without it"
+    title = "Disturbed, otherwise protected, or of fewer updates; beside the same scenes without it"
     return Table((*headings, "without it"), rows, title)
 
 

@@ -23,8 +23,9 @@ from handrail.datasets.storage.atomic import remove
 from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.study.design import StudyDesign
-from handrail.policies.study.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
+from handrail.policies.study.jobs import StudyCell, StudyJob, StudyLayout, StudyPolicy
 from handrail.policies.study.settings import (
+    FPS,
     evaluations,
     fingerprint,
     recording,
@@ -111,10 +112,11 @@ def _stale(
     if job.policy is None:
         return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
     policy, driven = job.policy, before.get("evaluations", {})
+    known = now["evaluations"] | driven
     if any(now[part] != before.get(part) for part in ("recording", "wanted", "training")):
-        return [layout.policy(policy), *(layout.evaluation(policy, what) for what in CONDITIONS)]
+        return [layout.policy(policy), *(layout.evaluation(policy, what) for what in known)]
     gone = last_checkpoint(layout.policy(policy)) is None
-    others = [what for what in CONDITIONS if gone or now["evaluations"].get(what) != driven.get(what)]
+    others = [what for what in known if gone or now["evaluations"].get(what) != driven.get(what)]
     return [layout.evaluation(policy, what) for what in others]
 
 
@@ -142,14 +144,13 @@ def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
 
     cell, root, need = job.cell, layout.dataset(job.cell), wanted(job.cell, design)
     driver = layout.policy(job.before.policy) if job.before and job.before.policy else Path()
-    share = None
+    copilot = None
     if way_of(cell, design).arbiter:
-        from handrail.policies.imitation.evaluation.copilot import share
+        from handrail.policies.imitation.evaluation.copilot import share as copilot
     while True:
         rows = read_episodes(root) if root.exists() else []
-        config = recording(cell, design, root, len(rows), driver)
         successes = sum(bool(row["success"]) for row in rows)
-        minutes = sum(row["length"] for row in rows) / config.dataset.fps / 60.0
+        minutes = sum(row["length"] for row in rows) / FPS / 60.0
         if successes >= need["episodes"] and minutes >= need["minutes"]:
             break
         if len(rows) >= _MOST_ATTEMPTS * need["episodes"] and successes < need["episodes"]:
@@ -157,11 +158,12 @@ def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
                 f"collecting {cell.name}: expected {need['episodes']} successes, "
                 f"got {successes} in {len(rows)} attempts"
             )
-        code = record(config, share)
+        share = min(minutes / need["minutes"], successes / max(1, need["episodes"]))
+        code = record(recording(cell, design, root, len(rows), driver, share), copilot)
         if code:
             raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
     if design.rounds:
-        ends = np.cumsum([row["length"] for row in rows]) / config.dataset.fps / 60.0
+        ends = np.cumsum([row["length"] for row in rows]) / FPS / 60.0
         late = {row["episode_index"] for row, end in zip(rows, ends, strict=True) if end > need["minutes"]}
         drop_episodes(root, lambda row: row["episode_index"] in late)
 

@@ -1,6 +1,8 @@
 """Laws of the completions: rules that turn a twist of the tool into a whole-body velocity."""
 
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -10,6 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, REST, asking, intent, roll
 
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_controller, build_modes
+from handrail.collect.world.mink import MINK
 from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.baselines.arm_completion import (
     LARGEST_RATE,
@@ -20,6 +26,7 @@ from handrail.controllers.baselines.arm_completion import (
     clamp_twist,
 )
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, blended, tool_twist
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
@@ -27,13 +34,14 @@ from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.scripts.bench.goal_reaching.config import BASELINES
 
 TWISTS = arrays(float, 6, elements=st.floats(-0.2, 0.2))
 NEAR_HOME = arrays(float, 9, elements=st.floats(-0.3, 0.3)).map(lambda change: HOME + change)
 ANY_TWIST = arrays(float, 6, elements=st.floats(-10, 10))
 BASES = arrays(float, 3, elements=st.floats(-2.0, 2.0))
-RIVALS = [name for name in BASELINES if name not in ("mpc", "safety_filter")]
+RIVALS = [name for name in BASELINES if name not in ("mpc", "mpc_one_stage", "safety_filter")]
 QUICK = settings(max_examples=30, deadline=None)
 
 
@@ -132,7 +140,7 @@ def test_a_base_that_follows_rests_when_nothing_is_asked():
     np.testing.assert_allclose(rule(q, REST, np.zeros(6), STEP), 0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["dls", "dls_arm", "blended", "mink"])
+@pytest.mark.parametrize("name", ["dls", "dls_arm", "dls_base", "blended", "mink", "mpc_one_stage"])
 def test_a_rival_follows_the_hand(name):
     """From home, after the acceleration, a slow twist is followed to a few per cent."""
     twist = np.array([0.05, 0.03, 0.02, 0.05, -0.05, 0.1])
@@ -191,20 +199,53 @@ def test_an_arm_without_a_base_completes_too():
         assert (arm.jacobian(HOME[3:]) @ v) @ twist > 0
 
 
-def test_mink_keeps_its_distance():
-    """Drive the hand into the robot's own mount: plain least squares gets close, mink does not."""
+BAR = Obstacle("bar", Shape("box", [0.05, 0.05, 0.4]), [0.0, 0.0, 0.2], frame="tool")
+WALL = Obstacle("wall", Shape("box", [0.1, 2.0, 2.0]), MODEL.pose(HOME).position + [1.0, 0.0, 0.0])
+
+
+def into_the_mount(q):
+    return MODEL.pose(q, "shoulder_link").position - MODEL.pose(q).position
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "way"), [((), into_the_mount), ((BAR, WALL), lambda q: np.array([1.0, 0.0, 0.0]))]
+)
+def test_mink_keeps_its_distance(obstacles, way):
+    """Drive the hand into the robot's mount, or what it holds at a wall: plain least squares gets close."""
     pytest.importorskip("mink")
     smallest = {}
-    for name in ("dls", "mink"):
-        rival, q, v = controller(name), HOME.copy(), REST
+    for rival in (controller("dls"), controller("mink"), resolved(MINK.build)(MODEL, STEP)):
+        name, q, v = rival, HOME.copy(), REST
+        rival.reset(tuple(each for each in obstacles if not each.held))
         for step in range(500):
-            towards = MODEL.pose(q, "shoulder_link").position - MODEL.pose(q).position
-            twist = np.append(0.15 * towards / np.linalg.norm(towards), np.zeros(3))
+            rival.update_scene(obstacles)  # what is held was grasped after the beginning
+            twist = np.append(0.15 * way(q) / np.linalg.norm(way(q)), np.zeros(3))
             command = rival.update(
                 State(q, v, step * STEP), intent(of_the_tool(twist), "ee", time=step * STEP)
             )
             after = command.velocity(STEP)
             q, v = q + 0.5 * STEP * (v + after), after
             smallest[name] = min(smallest.get(name, np.inf), command.diagnostics.smallest_distance)
-    assert smallest["dls"] < 0.02
-    assert smallest["mink"] > 0.04
+    plain, *kept = smallest.values()
+    assert plain < 0.02
+    assert min(kept) > 0.04
+
+
+def test_the_base_goes_first_by_the_mpc_s_weights():
+    """Of a way along the floor the base does nearly all, where plain least squares moves the arm."""
+    twist, shares = np.array([0.1, 0.05, 0.0, 0.0, 0.0, 0.0]), {}
+    for name in ("dls", "dls_base"):
+        _, v, _ = roll(controller(name), [asking(of_the_tool(twist), "ee")] * 30, period=STEP)
+        shares[name] = v[-1][:2] @ twist[:2] / (twist @ twist)
+    assert shares["dls_base"] > 0.85
+    assert shares["dls"] < 0.7
+
+
+def test_where_mink_is_missing_a_line_says_so_and_people_are_not_offered_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mink", None)
+    with pytest.raises(HandrailError, match=r"^differential IK: expected mink, found none; .*profile"):
+        build_controller(MODES["ee_mink"], MODEL, 20.0)
+    env = SimpleNamespace(model=MODEL)
+    offered = build_modes(SessionConfig(task="reach"), env)  # type: ignore[arg-type]
+    assert "ee_mink" not in offered
+    assert "ee_dls_base" in offered

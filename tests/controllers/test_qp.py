@@ -103,7 +103,7 @@ def test_the_factor_is_the_factor():
         assert not functions().factor(wrong, *wrong.shape)
 
 
-@pytest.mark.parametrize("horizon", [2, 5, 12])
+@pytest.mark.parametrize("horizon", [1, 2, 5, 12])
 @pytest.mark.parametrize("tight", [0.0, 0.05])  # the second needs slack
 def test_the_solution_is_that_of_a_dense_solver(horizon, tight):
     rng = np.random.default_rng(horizon)
@@ -124,8 +124,8 @@ def test_the_solution_is_that_of_a_dense_solver(horizon, tight):
         slacks += np.any(x[-SLACKS:] > 1e-6)
         np.testing.assert_allclose(program.solve(program.active), x, atol=1e-7)
         assert core.fields.changes == 0  # begun with the right rows there is nothing to change
-        wrong = rng.integers(0, same.rows.max() + 5, 8)  # any rows, and such as do not exist
-        np.testing.assert_allclose(program.solve(np.unique(wrong)), x, atol=1e-6)
+        wrong = np.unique(rng.integers(0, same.rows.max() + 5, 8))  # any rows, and such as do not exist
+        np.testing.assert_allclose(program.solve(wrong[: len(core.active)]), x, atol=1e-6)
     assert (slacks > 0) == (tight > 0.0)
 
 

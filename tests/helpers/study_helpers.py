@@ -14,7 +14,7 @@ from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.study.jobs import StudyLayout, jobs
 from handrail.policies.study.run import run_study
-from handrail.policies.study.settings import evaluations, fingerprint, load_design
+from handrail.policies.study.settings import after, evaluations, fingerprint, load_design
 
 DESIGN, SMALLEST = (
     (ROOT / "tests" / "data" / "studies" / f"{name}.toml").read_text() for name in ("small", "smallest")
@@ -71,7 +71,8 @@ def make(job, design, layout, shares=None):
                 rollouts = [made_up(seed, bool(rng.random() < share)) for seed in config.seeds]
                 entry = {"training_seed": job.cell.draw, "dataset_draw": job.cell.draw, "rollouts": rollouts}
                 protected = "unprotected" if protection == "none" else protection
-                ending = {"protected": protected, "disturbed": perturbation.words, "nominal": ""}[what]
+                endings = {"protected": protected, "disturbed": perturbation.words, "nominal": ""}
+                ending = endings[what] if what in endings else after(int(what.removeprefix("after-")))
                 arms[f"{job.policy.label} {ending}".strip()] = [entry]
             write_json(layout.evaluation(job.policy, what), {"format": FORMAT, "arms": arms})
     result = LEARNT if job.policy else COLLECTED

@@ -37,7 +37,7 @@ class Setting:
     @property
     def is_single(self) -> bool:
         """Whether only one axis is steered at a time."""
-        return self.mode.device == "single_axis"
+        return self.mode.device.startswith("single_axis")
 
     def switched(self, **changes: object) -> "Setting":
         """Return it with changes that count as a switch."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripted.erring_axis import ErringAxisMap
 from handrail.collect.operators.scripted.hand import HumanHand, Perception
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.input_map import InputMap, LeaderArmMap, StickMap
@@ -42,6 +43,13 @@ DEVICES = Registry(
     (
         ScriptedDevice("sticks", "velocity sticks on all channels of a mode", StickMap),
         ScriptedDevice("single_axis", "one stick, one axis at a time", SingleAxisMap, _BRISK, drives=True),
+        ScriptedDevice(
+            "single_axis_erring",
+            "one stick, one axis at a time, with errors",
+            ErringAxisMap,
+            _BRISK,
+            drives=True,
+        ),
         ScriptedDevice("leader_arm", _LEADER, LeaderArmMap, refractory=_POSITION_ORDER),
     ),
 )

@@ -15,7 +15,7 @@ from handrail.controllers.robot.model import Pose, RobotModel
 
 _NEAR = 0.35  # share of the tolerance that one axis may use up
 _MOST_CARE = 0.1
-_PREPARATION = 1.35  # of the mind before it thinks again: M of the keystroke-level model [s]
+PREPARATION = 1.35  # of the mind before it thinks again: M of the keystroke-level model [s]
 _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
 _SMALL_SHARES = (1.0, 0.5, 0.25, 0.12, 0.06)  # the same where the hand must not lean
 _CLEAR = 0.03  # what a sweep shall keep clear [m]
@@ -210,7 +210,7 @@ class SingleAxisMap(InputMap):
         self._order = [self.channels.joint_slice.start + joint for joint in order]
         self._care = max(0.5 * self._care, _MOST_CARE) if known else 1.0
         self._thought, self._axis_holds = target.identity, False
-        self._thinks_at = state.time + _PREPARATION
+        self._thinks_at = state.time + PREPARATION
 
     def _errors(self, goal: MotionGoal, target: Target, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return how far each axis is from where it belongs, (m,), and how near is near enough, (m,)."""

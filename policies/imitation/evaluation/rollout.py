@@ -38,17 +38,28 @@ _STILL = 0.05  # extent of the tool's way in that time, at the scale of the robo
 
 
 class RolloutProgress:
-    """Watches a rollout: the furthest stage of the task that it came to, and whether it stood still."""
+    """Watches a rollout: the furthest stage of the task that it came to, and whether it stood still.
+
+    Attributes:
+        told: `distances` of the tool to where it is to go, one a second [m], and when it touched something
+            first, `first_contact` [s]; what there is.
+    """
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Take note that an episode begins."""
-        self._env = env
+        self._env, self._frames = env, 0
+        self.told: dict[str, Any] = {"distances": []}
         self._furthest, self._stage = -1, -1
         self._tools: deque[FloatArray] = deque(maxlen=max(2, round(_LATELY * env.fps)))
 
     def see(self, frame: Frame) -> None:
         """Look at the truth of this moment."""
         state, task = self._env.task_state(), self._env.task
+        if self._frames % round(self._env.fps) == 0 and (aim := task.aim(state)):
+            self.told["distances"].append(round(float(np.linalg.norm(state.tool.position - aim.position)), 3))
+        if frame.contacts:
+            self.told.setdefault("first_contact", round(self._frames / self._env.fps, 6))
+        self._frames += 1
         self._tools.append(state.tool.position)
         if task.stages:
             self._stage = task.stages.index(task.stage(state))
@@ -111,7 +122,8 @@ def run_rollout(
         progress = RolloutProgress()
         session = Session(env, controller, late, (*observers, progress), disturbances=pushers)
         outcome = session.run(seed)
-    return _row(outcome, operator.malformed) | ({} if outcome.success else progress.failed(outcome))
+    failed = {} if outcome.success else progress.failed(outcome)
+    return _row(outcome, operator.malformed) | progress.told | failed
 
 
 def _session_config(condition: PolicyCondition) -> SessionConfig:

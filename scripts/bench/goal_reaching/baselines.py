@@ -139,6 +139,11 @@ def mpc_paper(model: RobotModel, period: float) -> Controller:
     return MaskedMpc(model, paper_settings())
 
 
+def mpc_one_stage(model: RobotModel, period: float) -> Controller:
+    """Return the masked MPC with the paper's weights and a horizon of one stage: it predicts nothing."""
+    return MaskedMpc(model, replace(paper_settings(), horizon=1))
+
+
 def nominal_base(model: RobotModel, period: float) -> Controller:
     """Return damped least squares on the arm, and a nominal base."""
     return TwistController(model, WeldedBaseCompletion(model), period)

@@ -16,6 +16,7 @@ _DIRECT = "handrail.controllers.baselines.direct:DirectController"
 _CBF = "handrail.controllers.baselines.cbf_filter:CbfFilter"
 _FILTER = "handrail.controllers.mpc.safety_filter:safety_filter"
 _DLS = "handrail.controllers.baselines.twist_completion:least_squares_controller"
+_DLS_BASE = "handrail.controllers.baselines.twist_completion:base_first_controller"
 _MINK = "handrail.collect.world.mink:MinkController"
 _RL = "handrail.policies.rl.controller:RlController"
 TAKE_UP = (1.0, 0.65)  # time constants of the low-pass, of the hand's translation and turn [s]
@@ -57,6 +58,8 @@ BASELINES = Registry(
         Baseline("mpc_paper", "masked MPC, the paper's horizon", f"{_HERE}:mpc_paper", period=0.09),
         Baseline("rl_low_pass", "SAC behind the MPC's low-pass", _RL, _SMOOTHED, aims=True, lag=TAKE_UP),
         Baseline("mink_low_pass", "mink behind the MPC's low-pass", _MINK, _SMOOTHED, lag=TAKE_UP),
+        Baseline("mpc_one_stage", "mpc_paper without its horizon", f"{_HERE}:mpc_one_stage", period=0.09),
+        Baseline("dls_base", "damped least squares, mpc_paper's weights", _DLS_BASE),
         Baseline("dls", "damped least squares, whole body", _DLS),
         Baseline("dls_arm", "damped least squares on the arm, nominal base", f"{_HERE}:nominal_base"),
         Baseline("decoupled", "decoupled base and arm", f"{_HERE}:base_following"),

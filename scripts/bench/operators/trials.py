@@ -38,7 +38,7 @@ _PRELOAD = ("handrail.scripts.bench.operators.trials",)
 _FPS = 20  # [Hz]
 _PLACES = 4  # digits that are kept
 _OF_OUTCOME = (*("success", "failure_reason", "seconds", "frames", "smallest_distance", "brakes"),)
-SLOW_MODE = "direct_single"  # needs more time than the tasks give
+SLOW_MODES = ("direct_single", "direct_erring")  # need more time than the tasks give
 SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.0}  # [s]
 
 
@@ -194,7 +194,7 @@ def run_trial(config: TrialsConfig, task: str, mode: str, episode: int) -> Opera
 @lru_cache(maxsize=16)
 def _watched(config: TrialsConfig, task: str, mode: str, person: int) -> "tuple[Session, _Hands]":
     """Return the session of a person, built once a process."""
-    limit = SLOW_LIMITS.get(task, 0.0) if mode == SLOW_MODE else 0.0
+    limit = SLOW_LIMITS.get(task, 0.0) if mode in SLOW_MODES else 0.0
     settings = SessionConfig(
         task=task, mode=mode, robot=config.robot, noise=config.noise, person=person, time_limit=limit
     )

@@ -21,7 +21,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.shape import Obstacle, Shape
 
-NAMES = ["direct_single", "leader", "decoupled", "direct"]
+NAMES = ["direct_single", "direct_erring", "leader", "decoupled", "direct"]
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +45,26 @@ def test_one_axis_at_a_time(view):
     used = {channels.names[int(np.argmax(intent.mask))] for intent in intents}
     assert {name.split(".")[0] for name in used} == {"base", "joint"}
     assert not used & {f"joint.{name}" for name in MODEL.description.base.joints}
+
+
+def test_who_errs_looks_for_the_axis_and_guesses_which_way_a_new_joint_goes(view):
+    """Every change of the axis takes 0.15 log₂ 10 s; half of the first pushes go the wrong way."""
+    first, pauses = [], []
+    for seed in range(12):
+        intents, path = drive(view, "direct_erring", PERFECT, seconds=20.0, seed=seed)
+        axes = [int(np.argmax(intent.mask)) for intent in intents]
+        signs = dict[int, float]()
+        for step in range(1, len(axes)):
+            if axes[step] != axes[step - 1]:
+                moving = next((k for k in range(step, len(axes)) if intents[k].values.any()), len(axes))
+                pauses.append((moving - step) * PERIOD)
+            if axes[step] >= 9 and intents[step].values.any():
+                signs.setdefault(axes[step], float(np.sign(intents[step].values[axes[step]])))
+        first += [sign == np.sign((path[-1] - HOME)[axis - 9]) for axis, sign in signs.items()]
+    assert min(pauses) >= 0.15 * np.log2(10.0) - PERIOD
+    assert 0.3 < np.mean(first) < 0.7
+    one, same = (drive(view, "direct_erring", HumanSettings(), seed=3)[1] for _ in range(2))
+    np.testing.assert_array_equal(one, same)
 
 
 @pytest.mark.parametrize("name", ["direct_single", "decoupled", "leader", "ee"])

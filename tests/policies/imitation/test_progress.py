@@ -1,6 +1,7 @@
 """Where a rollout failed: the furthest stage it came to, and how it ended."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -41,14 +42,23 @@ def test_every_stage_has_its_moment_in_order():
     assert [task.stage(moment) for moment in IN_ORDER.values()] == list(task.stages)
 
 
-def watched(states, task=None, reason="timeout"):
-    """Return what is said of a failed rollout that went through some moments."""
+class Aimless(Tray):
+    """A task that neither has stages nor says where the hand is to go."""
+
+    def aim(self, state):
+        """Return nothing."""
+
+
+def watched(states, task=None, reason="timeout", contacts=()):
+    """Return what is said of a failed rollout that went through some moments, some of them with a contact."""
     moments = iter(states)
     env = SimpleNamespace(task=task or PickPlace(), fps=20, model=MODEL, task_state=lambda: next(moments))
     progress = RolloutProgress()
     progress.begin(env, 0)  # type: ignore[arg-type]
-    for _ in states:
-        progress.see(None)  # type: ignore[arg-type]
+    for moment in range(len(states)):
+        progress.see(SimpleNamespace(contacts=moment in contacts))  # type: ignore[arg-type]
+    if contacts:
+        return progress.told
     return progress.failed(SimpleNamespace(failure_reason=reason))  # type: ignore[arg-type]
 
 
@@ -86,4 +96,15 @@ def test_a_hand_that_was_at_the_goal_had_only_to_turn():
 
 
 def test_a_task_without_stages_says_how_it_ended():
-    assert watched([AWAY] * 200, Tray()) == {"ended": "stalled"}
+    assert watched([AWAY] * 200, Aimless()) == {"ended": "stalled"}
+
+
+def test_the_distance_is_told_each_second_and_the_first_contact():
+    """To the cube, then, once it is in hand, to the place above the bin: each as the task's aim says it."""
+    way = [*[AWAY] * 20, *[AT] * 20, *[OVER] * 5]
+    above = PickPlace().aim(OVER)
+    expected = [0.5, 1.5 * WIDTH, np.linalg.norm(OVER.tool.position - above.position)]
+    told: Any = watched(way, contacts=(30, 31, 40))
+    np.testing.assert_allclose(told["distances"], expected, atol=5e-4)
+    assert told["first_contact"] == 1.5
+    assert watched([AWAY] * 200, Aimless(), contacts=(7,)) == {"distances": [], "first_contact": 0.35}

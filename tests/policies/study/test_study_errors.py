@@ -17,6 +17,7 @@ from handrail.policies.study import design as design_module
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import (
     Beside,
+    DeclaredPair,
     Factors,
     Flat,
     Robustness,
@@ -29,6 +30,7 @@ from handrail.policies.study.settings import load_design
 
 SHOWN = ("\n", " = "), ("[", ""), ("[rounds.", ".")
 FACTORS = "[factors]\nhand_mpc = 'ee'\nhand_none = 'direct'\njoint_mpc = 'ee'\njoint_none = 'direct'\n"
+PAIR = "[[pairs]]\none = 'ee'\nother = 'direct'\n"
 
 
 @pytest.mark.parametrize(
@@ -52,6 +54,19 @@ FACTORS = "[factors]\nhand_mpc = 'ee'\nhand_none = 'direct'\njoint_mpc = 'ee'\nj
         (("[beside]", FACTORS.replace("direct", "leader") + "[beside]"), "unknown mode of the factors"),
         (("[beside]", FACTORS + "[beside]"), "factors expected some, each once"),
         (("[beside]", FACTORS + 'primary = ["luck"]\n[beside]'), "unknown contrast 'luck'"),
+        (("[beside]", PAIR.replace("direct", "leader") + "[beside]"), "unknown mode of a pair 'leader'"),
+        (("[beside]", PAIR + FACTORS + "[beside]"), "expected pairs or factors.primary, got both"),
+        (("[beside]", PAIR.replace("one", "own") + "[beside]"), "own"),
+        (
+            ("rollouts = 40", "rollouts = 40\ncurve = [4, 6]"),
+            "curve expected multiples of the first below 10",
+        ),
+        (
+            ("rollouts = 40", "rollouts = 40\ncurve = [5, 10]"),
+            "curve expected multiples of the first below 10",
+        ),
+        (('"direct"]', '"direct", "ee_and_psychic"]'), "unknown mode 'psychic'"),
+        (("[beside]", "[beside]\nnumbered = ['leader']"), "same_number"),
         (("rollouts = 40", "rollouts = 2000000"), "--episodes: expected a whole number"),
         (('["push"]', '["pusch"]'), "pusch"),
         (('["push"]\nprotections = ["filter"]', "[]\nprotections = []"), "robustness expected some"),
@@ -81,7 +96,7 @@ def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(tmp_path,
 
 def test_every_setting_of_a_design_is_explained_where_people_look():
     written = design_module.__doc__ or ""
-    for kind in (StudyDesign, TaskDesign, Flat, Factors, Beside, Robustness, Rounds, Way):
+    for kind in (StudyDesign, TaskDesign, Flat, Factors, DeclaredPair, Beside, Robustness, Rounds, Way):
         for entry in dataclasses.fields(kind):
             described = any(f"{mark}{entry.name}{end}" in written for mark, end in SHOWN)
             assert described or entry.name in ("name", "digest"), entry.name

@@ -13,10 +13,10 @@ from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.training import presets
 from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import Flat
-from handrail.policies.study.jobs import jobs
+from handrail.policies.study.design import DeclaredPair, Flat
+from handrail.policies.study.jobs import StudyCell, jobs
 from handrail.policies.study.progress import StudyProgress
-from handrail.policies.study.settings import evaluations, fingerprint, load_design, recording
+from handrail.policies.study.settings import evaluations, fingerprint, load_design, recording, training
 from handrail.policies.study.work import begin, do, work
 
 
@@ -81,17 +81,35 @@ def test_every_setting_of_the_design_is_part_of_what_something_depends_on(preset
 
     others = [dataclasses.replace(design, **{key: value}) for key, value in (
         ("policy", "diffusion"), ("rollouts", 41), ("persons", 1), ("seed", 1), ("flat", Flat()),
-        ("beside", None), ("robustness", None), ("draws", 3),
+        ("beside", None), ("robustness", None), ("draws", 3), ("curve", (5,)),
         ("encoders", dict.fromkeys(design.tasks, "ridgeback_ur10-reach")),
         *(("flat", Flat(**{name: 0.5})) for name in ("held_out", "improvement")),
         *(("flat", Flat(**{name: 7})) for name in ("every", "patience")),
     )]  # fmt: skip
     others += [changed(design, **{key: value}) for key, value in (
         ("episodes", 6), ("minutes", 0.2), ("steps", 11), ("batch_size", 4), ("rollout_limit", 9.0),
+        ("time_limit", 9.0), ("sizes", (0.05,)),
     )]  # fmt: skip
     assert all(prints(other) != prints(design) for other in others)
     assert len({str(prints(other)) for other in others}) == len(others)
-    assert prints(dataclasses.replace(design, name="other", baseline="ee")) == prints(design)
+    same = {"name": "other", "baseline": "ee", "pairs": (DeclaredPair("ee", "direct"),)}
+    assert prints(dataclasses.replace(design, **same)) == prints(design)
+
+
+def test_half_of_a_mixed_recording_is_of_each_mode_and_smaller_policies_learn_from_it_too(tmp_path, preset):
+    cell = StudyCell("reach", "ee_and_leader", 0)
+    design = changed(load_design(preset), sizes=(0.05,))
+    design = dataclasses.replace(design, modes=("ee_and_leader", "direct"), beside=None, curve=(5,))
+    modes = [recording(cell, design, tmp_path, share=share).mode for share in (0.0, 0.49, 0.5, 1.0)]
+    assert modes == ["ee", "ee", "leader", "leader"]
+    found = {job.policy: job for job in jobs(design) if job.cell == cell and job.policy}
+    assert [policy.label for policy in found] == ["ee_and_leader", "ee_and_leader 0.05 min"]
+    minutes = [training(policy, design, tmp_path, tmp_path).minutes for policy in found]
+    assert minutes == [0.1, 0.05]
+    whole, less = (evaluations(job, design, "run/checkpoints/000010/model") for job in found.values())
+    assert "after-5" not in less
+    assert whole["after-5"].policy == ("run/checkpoints/000005/model",)
+    assert {training(policy, design, tmp_path, tmp_path).save_freq for policy in found} == {5}
 
 
 BREAK = {

@@ -12,12 +12,18 @@ from made_study import DESIGN, FACTORS, MODES, SHARES, TASK
 from scipy import stats
 
 from handrail.datasets.statistics.contrast import holm
-from handrail.datasets.statistics.replicates import student, variance_of_share
+from handrail.datasets.statistics.replicates import (
+    equivalence_p,
+    equivalence_power,
+    student,
+    variance_of_share,
+)
 from handrail.policies.study import tables
-from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
-from handrail.policies.study.design import Flat, Robustness
+from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, contrasts
+from handrail.policies.study.declared import WORDS, declared
+from handrail.policies.study.design import DeclaredPair, Flat, Robustness
 from handrail.policies.study.figures import figures
-from handrail.policies.study.power import detectable, plan, weights
+from handrail.policies.study.power import detectable, plan
 from handrail.policies.study.report import answer, cautions
 from handrail.policies.study.results import MEASURES
 
@@ -107,9 +113,10 @@ def test_draws_that_agree_by_chance_are_not_sure(gathered):
 @pytest.mark.parametrize("contrast", ["input", "controller", "interaction"])
 def test_what_is_planned_is_detected_in_four_of_five_studies(contrast):
     """Policies drawn with the design's spread and the worst rollouts, an effect as large as planned for."""
-    rng, sizes, found = np.random.default_rng(3), weights(FACTORS, contrast), 0
+    rng, found, studies = np.random.default_rng(3), 0, 2000
     design = replace(DESIGN, draws=8, rollouts=50)
-    effect, studies = detectable(design, contrast), 2000
+    (asked,) = (each for each in declared(design) if each.name == contrast)
+    effect, sizes = detectable(design, asked), asked.parts
     total = sum(weight**2 for weight in sizes.values())
     for _ in range(studies):
         values = np.zeros(8)
@@ -120,6 +127,63 @@ def test_what_is_planned_is_detected_in_four_of_five_studies(contrast):
         estimate: Any = student(values, least=0.0)
         found += estimate.p < 0.05 / 3
     assert found / studies == pytest.approx(0.8, abs=0.06)
+
+
+PAIRS = (DeclaredPair("ee", "decoupled", margin=0.1, sd=0.05), DeclaredPair("ee", "direct", "number"))
+
+
+def test_pairs_that_are_declared_are_tested_and_no_others(gathered):
+    design = replace(DESIGN, factors=None, pairs=PAIRS)
+    results = gathered(design)
+    found: Any = contrasts(results)
+    declared = [each for each in found if each.family == DECLARED]
+    assert [each.label for each in declared] == ["ee − decoupled", "ee − direct (same number)"]
+    assert [each.p_adjusted for each in declared] == holm([each.p for each in declared])
+    for each, names in zip(
+        declared, (("ee", "decoupled"), ("ee same number", "direct same number")), strict=True
+    ):
+        one, other = (
+            np.mean([shares_of(results, t, name) for t in ("reach", "tray")], axis=0) for name in names
+        )
+        assert each.estimate == pytest.approx((one - other).mean())
+    assert all(each.p_adjusted is None for each in found if each.family != DECLARED)
+    assert {("ee − decoupled", "tray"), ("ee − direct (same number)", "reach")} <= {
+        (each.label, each.scope) for each in found if each.family == EXPLORATORY
+    }
+    said = answer(found, design)
+    assert said[0].startswith("Ee − decoupled")
+    assert "Equivalence of ee − decoupled within 10 points: not shown" in said[-1]
+    like = gathered(design, shares=dict.fromkeys(SHARES, (0.95, 0.9, 1.0, 0.9)))
+    assert "within 10 points: shown, p 0.0" in answer(contrasts(like), design)[-1]
+    text = plan(design)
+    assert "Declared: ee − decoupled, ee − direct (same number), over reach, tray together." in text
+    assert str(tables.contrasts_table(found, DECLARED, results).rows[0][-1]).endswith("points")
+    usual: Any = contrasts(gathered(replace(design, pairs=(DeclaredPair("ee", "direct"),))))
+    names = [(each.label, each.scope, each.measure.name) for each in usual]
+    assert len({*names}) == len(names)  # what is compared with the baseline anyway is not there twice
+    assert usual[0].family == DECLARED
+
+
+def test_equivalence_is_found_as_often_as_planned_and_rarely_where_there_is_none():
+    """Two one-sided tests of the means of 8 draws; at the very margin they err in 5 %."""
+    rng, error = np.random.default_rng(5), 0.03
+    found = dict.fromkeys((0.0, 0.1), 0)
+    for true in found:
+        for _ in range(4000):
+            values = true + error * np.sqrt(8.0) * rng.standard_normal(8)
+            found[true] += (equivalence_p(student(values, least=0.0), 0.1) or 0.0) < 0.05
+    assert found[0.0] / 4000 == pytest.approx(equivalence_power(0.1, error, 7), abs=0.06)
+    assert found[0.1] / 4000 == pytest.approx(0.05, abs=0.015)
+
+
+def test_success_over_updates_is_a_figure_and_stands_beside_all_updates(gathered):
+    results = gathered(replace(DESIGN, curve=(5,)))
+    whole, less = (results.find("reach", "ee", treatment) for treatment in ("", "after 5 updates"))
+    made = figures(results, contrasts(results))
+    assert "robustness" not in made
+    assert shows(made["updates"], [100 * less.value.estimate, 100 * whole.value.estimate])
+    check_texts(made["updates"])
+    assert {row[1] for row in tables.treatments_table("reach", results).rows} == {"after 5 updates"}
 
 
 def test_a_system_is_compared_with_the_best_policy_alone_and_named_so(gathered):

@@ -48,7 +48,7 @@ def test_the_low_pass_begins_at_rest_in_every_episode():
     np.testing.assert_array_equal(first.v, second.v)
 
 
-@pytest.mark.parametrize("name", ["mpc_paper", "mpc"])
+@pytest.mark.parametrize("name", ["mpc_paper", "mpc", "mpc_one_stage"])
 def test_no_update_comes_so_late_that_the_certified_stop_begins(name):
     """The simulation's steps decide when a controller is asked, not its period alone."""
     baseline = BASELINES[name]
