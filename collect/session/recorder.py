@@ -43,16 +43,14 @@ class _Aside:
 
     def take(self, frame: Frame) -> Frame:
         """Return a frame with its pictures."""
-        sizes = {name: int(np.prod(shape)) for name, shape in self._shapes.items()}
+        sizes = [int(np.prod(shape)) for shape in self._shapes.values()]
         with explained("cannot read the pictures of an episode"):
-            self.file.seek(frame.number * sum(sizes.values()))
-            read = {name: np.frombuffer(self.file.read(size), np.uint8) for name, size in sizes.items()}
-            for name, size in sizes.items():
-                if len(read[name]) < size:
-                    raise OSError(
-                        f"frame {frame.number}: expected {name}, got {len(read[name])} of {size} bytes"
-                    )
-        images = {name: read[name].reshape(shape) for name, shape in self._shapes.items()}
+            self.file.seek(frame.number * sum(sizes))
+            data = np.frombuffer(self.file.read(sum(sizes)), np.uint8)
+            if len(data) < sum(sizes):
+                raise OSError(f"frame {frame.number}: expected {sum(sizes)} bytes, got {len(data)}")
+        parts = zip(self._shapes.items(), np.split(data, np.cumsum(sizes)), strict=False)
+        images = {name: part.reshape(shape) for (name, shape), part in parts}
         return replace(frame, images=images)
 
 

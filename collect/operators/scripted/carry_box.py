@@ -6,6 +6,7 @@ import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase, from_phase
+from handrail.collect.operators.scripted.pick_place import above
 from handrail.collect.world.task import hand_rotation
 from handrail.collect.world.tasks.carry_box import APART, GRASP
 from handrail.controllers.arrays import FloatArray
@@ -30,7 +31,7 @@ class CarryBoxScript(PhasedScript):
         down = hand_rotation(now.rotation[:, 0], [0.0, 0.0, -1.0])
         ahead = hand_rotation([1.0, 0.0, 0.0], [0.0, 0.0, -1.0])
         pick = now.position + now.rotation @ GRASP
-        table, lifted = tables[1], _up(pick, _OVER)
+        table, lifted = tables[1], above(pick, _OVER)
         place = np.array([table.front + _INSIDE, table.position[1], table.top + pick[2] - tables[0].top])
         height = max(pick[2], place[2]) + _OVER
         stands = [np.array([where[0] - _AHEAD, where[1], 0.0]) for where in (pick, place)]
@@ -42,21 +43,17 @@ class CarryBoxScript(PhasedScript):
 
         at = partial(ScriptPhase.at, rotation=down, base=stands[0], apart=APART)
         pick_up = [
-            at("above", _up(pick, 0.12), distance=0.02, angle=0.08),
+            at("above", above(pick, 0.12), distance=0.02, angle=0.08),
             at("descend", pick, distance=0.012, angle=0.08, pace=0.4, patience=8.0),
             at("grasp", pick, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
             at("lift", lifted, distance=0.04, angle=0.2, gripper=1.0, pace=0.5),
         ]
         at = partial(ScriptPhase.at, rotation=ahead, base=stands[1], apart=APART)
         put_down = [
-            at("over", _up(place, 0.10), distance=0.03, angle=0.15, gripper=1.0),
-            at("lower", _up(place, 0.008), distance=0.012, angle=0.3, gripper=1.0, pace=0.3, patience=8.0),
-            at("release", _up(place, 0.008), distance=1.0, angle=3.2, dwell=1.0),
-            at("rise", _up(place, 0.20), distance=0.03, angle=0.3),
+            at("over", above(place, 0.10), distance=0.03, angle=0.15, gripper=1.0),
+            at("lower", above(place, 0.008), distance=0.012, angle=0.3, gripper=1.0, pace=0.3, patience=8.0),
+            at("release", above(place, 0.008), distance=1.0, angle=3.2, dwell=1.0),
+            at("rise", above(place, 0.20), distance=0.03, angle=0.3),
         ]
         first = [crossing("approach", pick, 0.0)] if route.blocked(view.state.q[:2], stands[0][:2]) else []
         return [*first, *pick_up, crossing("retreat", pick), crossing("cross", place), *put_down]
-
-
-def _up(place: FloatArray, height: float) -> FloatArray:
-    return place + np.array([0.0, 0.0, height])

@@ -73,7 +73,7 @@ class PickPlaceScript(PhasedScript):
                 carry("cross", lane + ahead, place[1], np.array([lane, place[1], 0.0])),
                 carry("front", edges[1] - _RETREAT * scale, place[1], stands[1]),
             ]
-        rim = _above(place, task.object("bin").top - place[2])
+        rim = above(place, task.object("bin").top - place[2])
         taking = self._pick(view, pick, down, stands[0])
         return [*begin, *taking, *way, *self._place(rim, down, stands[1])]
 
@@ -90,18 +90,18 @@ class PickPlaceScript(PhasedScript):
     def _pick(self, view: View, cube: FloatArray, down: FloatArray, base: FloatArray) -> list[ScriptPhase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
         grip, at = self._grip, partial(ScriptPhase.at, rotation=down, base=base)
-        room, grasp = self._room(view), _above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
+        room, grasp = self._room(view), above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
         return [
-            at("above", _above(cube, 0.14 * grip), distance=0.02 * grip, angle=0.10),
+            at("above", above(cube, 0.14 * grip), distance=0.02 * grip, angle=0.10),
             at("descend", grasp, distance=_NEAR * grip, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),
             at("grasp", grasp, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
-            at("lift", _above(cube, 0.22 * grip), distance=0.04 * grip, angle=0.3, gripper=1.0, pace=0.6),
+            at("lift", above(cube, 0.22 * grip), distance=0.04 * grip, angle=0.3, gripper=1.0, pace=0.6),
         ]
 
     def _place(self, rim: FloatArray, down: FloatArray, base: FloatArray) -> list[ScriptPhase]:
         """Go over the bin's rim, down, open the fingers, rise."""
         grip, at = self._grip, partial(ScriptPhase.at, rotation=down, base=base)
-        over, low, high = (_above(rim, rise * grip) for rise in (0.18, 0.045, 0.25))
+        over, low, high = (above(rim, rise * grip) for rise in (0.18, 0.045, 0.25))
         return [
             at("over", over, gripper=1.0, distance=0.03 * grip, angle=0.3),
             at("lower", low, gripper=1.0, distance=0.025 * grip, angle=0.3, pace=0.4),
@@ -110,7 +110,8 @@ class PickPlaceScript(PhasedScript):
         ]
 
 
-def _above(position: FloatArray, height: float) -> FloatArray:
+def above(position: FloatArray, height: float) -> FloatArray:
+    """Return a place above another, (3,) [m]."""
     return position + np.array([0.0, 0.0, height])
 
 
