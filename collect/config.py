@@ -15,7 +15,8 @@ from handrail.collect.flags import check_file, check_names, names, one_of, only_
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.shared.catalogue import ARBITERS, ArbiterSettings
+from handrail.collect.operators.shared.catalogue import ARBITERS
+from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.collect.teleop_config import TeleopConfig
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, shown

@@ -53,6 +53,7 @@ class Cockpit:
         wanted: how many episodes; 0 where nobody said.
         next: what one can do with them afterwards, a command a line.
         say: is told at the end what was dropped.
+        shared: whether a policy drives beside the person.
 
     Attributes:
         person: whoever steers.
@@ -69,10 +70,11 @@ class Cockpit:
         wanted: int = 0,
         next: Sequence[str] = (),
         say: Callable[[str], None] = lambda words: None,
+        shared: bool = False,
     ) -> None:
-        self._model, self._server, self._say = model, server, say
+        self._model, self._server, self._say, self._shared = model, server, say, shared
         self._refuses, self._folder, self._wanted, self._next = refuses, folder, wanted, next
-        self._episodes, self.person = EpisodeList(server), Person(model, modes, first)
+        self._episodes, self.person = EpisodeList(server), Person(model, modes, first, supervises=shared)
         self._disk = DiskRoom(Path(folder).absolute()) if folder else None
         self._strain = Strain()
         Image.preinit()  # else the first picture of an episode waits for that
@@ -87,7 +89,7 @@ class Cockpit:
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Show the scene of a new episode."""
-        self._env, self._snapshots = env, Snapshots(env)
+        self._env, self._snapshots = env, Snapshots(env, self._shared)
         self._acted, self._delay = -math.inf, 0.0
         self._poses = EpisodePoses(env.simulation.mujoco_model)
         self._send_stage()
@@ -208,6 +210,7 @@ class Cockpit:
             "scale": robot.world.scale,
             "base_size": robot.base.size if len(channels.base) else (),
         }
+        said |= {"policy": True} if self._shared else {}
         self._server.pipe.send_surely(Kind.STAGE, said, (Kind.STAGE,))
 
 
@@ -223,9 +226,8 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
         f"handrail-replay {folder}",
         f"handrail-train {folder} --output outputs/policy",
     ]
-    return Cockpit(
-        env.model, modes, config.mode_name, server, folder=folder, wanted=wanted, next=then, say=say
-    )
+    settings = {"folder": folder, "wanted": wanted, "next": then, "say": say, "shared": bool(config.policy)}
+    return Cockpit(env.model, modes, config.mode_name, server, **settings)
 
 
 def _known(limit: float) -> float | None:

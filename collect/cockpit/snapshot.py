@@ -1,24 +1,23 @@
 """What the page shows of a moment: one small value, many times a second."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from handrail.collect.cockpit import stage
+from handrail.collect.cockpit.ahead import base_ahead, hands_ahead
+from handrail.collect.cockpit.drivers import drivers, of_person
 from handrail.collect.cockpit.nearest import NearestPair
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.task import TaskState
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
-from handrail.controllers.interface.intent import Intent
-from handrail.controllers.numerics.rotation import quaternion_from_matrix, turned
+from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.description import RobotDescription
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.model import Pose
 from handrail.datasets.recording.frames import Frame
 
 STATUS: Mapping[Status, str] = {
@@ -31,7 +30,6 @@ STATUS: Mapping[Status, str] = {
     Status.SOLVER_FAILED: "braking: no plan was found",
     Status.BACKUP: "braking: no safe way on",
 }
-AHEAD = 0.6  # how far the ghosts of the page are ahead of the robot [s]
 _PATH_STEPS = 8  # of a plan that is drawn
 _CLOSE = 0.02  # to a limit [rad, m]
 _MOST = 2  # contacts, and joints, that are named
@@ -55,62 +53,16 @@ def reason(status: Status, contacts: Iterable[str], q: FloatArray, robot: RobotD
     return " · ".join(filter(None, [STATUS[status], *found]))
 
 
-def hands_ahead(
-    model: RobotModel, intent: Intent, tools: Sequence[Pose], q: FloatArray
-) -> tuple[Pose | None, ...]:
-    """Return each hand's pose within `AHEAD`, at the velocity that is asked for; None where none is."""
-    channels, asked = Channels.of(model.description), _asked(intent)
-    pair, joints = asked[channels.pair_slice], asked[channels.joint_slice]
-    if pair.any():
-        return _pair_ahead(pair, tools, intent.frames.tool == "tool")
-    moved, found = joints[len(channels.base) :].any(), list[Pose | None]()
-    for number, (hand, tool) in enumerate(zip(model.description.hands, tools, strict=True)):
-        twist = asked[channels.hand_slice(number)]
-        if twist.any():
-            axes = tool.rotation if intent.frames.tool == "tool" else np.eye(3)
-            found.append(_moved(tool, axes @ twist[:3], axes @ twist[3:], tool.position))
-        else:
-            found.append(model.pose(q + AHEAD * joints, hand.named("tool")) if moved else None)
-    return tuple(found)
-
-
-def _pair_ahead(pair: FloatArray, tools: Sequence[Pose], in_tool: bool) -> tuple[Pose, ...]:
-    """Return the poses of two hands that move as one body about the middle between them, and part."""
-    axes = tools[0].rotation if in_tool else np.eye(3)
-    way = tools[1].position - tools[0].position
-    parting = 0.5 * pair[6] * way / max(float(np.linalg.norm(way)), 1e-9)
-    middle, linear, angular = tools[0].position + 0.5 * way, axes @ pair[:3], axes @ pair[3:6]
-    one, other = tools
-    return (
-        _moved(one, linear - parting, angular, middle),
-        _moved(other, linear + parting, angular, middle),
-    )
-
-
-def _moved(tool: Pose, linear: FloatArray, angular: FloatArray, about: FloatArray) -> Pose:
-    """Return a pose within `AHEAD` that goes along, and turns about a point."""
-    turn = Rotation.from_rotvec(AHEAD * angular).as_matrix()
-    return Pose(about + turn @ (tool.position - about) + AHEAD * linear, turn @ tool.rotation)
-
-
-def base_ahead(model: RobotModel, intent: Intent, q: FloatArray) -> FloatArray | None:
-    """Return the base's x, y [m] and yaw [rad] in the world, (3,), within `AHEAD`; None likewise."""
-    channels, asked = Channels.of(model.description), _asked(intent)
-    base = slice(0, len(channels.base))
-    twist, joints = asked[channels.base_slice], asked[channels.joint_slice][base]
-    if twist.any():
-        return q[base] + AHEAD * turned(twist, q[2] + 0.5 * AHEAD * twist[2])
-    return q[base] + AHEAD * joints if joints.any() else None
-
-
-def _asked(intent: Intent) -> FloatArray:
-    return np.where(intent.mask, np.nan_to_num(intent.values), 0.0)
-
-
 class Snapshots:
-    """Puts together what the page shows of an environment in which an episode has begun."""
+    """Puts together what the page shows of an environment in which an episode has begun.
 
-    def __init__(self, env: HandrailEnv) -> None:
+    Args:
+        env: of the episode.
+        shared: whether a policy drives beside the person; then it also says who drives what.
+    """
+
+    def __init__(self, env: HandrailEnv, shared: bool = False) -> None:
+        self._shared = shared
         self._env, self._model = env, env.model
         self._nearest = NearestPair(env.simulation.mujoco_model)
         self._frame: Frame | None = None
@@ -154,6 +106,7 @@ class Snapshots:
             "q": np.round(state.q, 3).tolist(),
             "v": np.round(state.commanded, 3).tolist(),
             **self._controlled(view),
+            **self._drivers(view, person),
             "age": round(min(person.age, 99.0), 3),
             "round_trip": round(person.round_trip, 4),
         }
@@ -167,6 +120,15 @@ class Snapshots:
         pose = np.round(np.concatenate([aim.position, turn]), 4).tolist()
         said = {"name": aim.name, "pose": pose, "distance": aim.distance, "angle": round(aim.angle, 4)}
         return said | {"hand": state.hand}
+
+    def _drivers(self, view: View, person: Person) -> dict[str, Any]:
+        """Return who drives what, where a policy can; nobody while the robot brakes for want of a command."""
+        if not self._shared:
+            return {}
+        frame, drives = self._frame, person.phase is Phase.DRIVING
+        moves = frame is not None and frame.diagnostics.status is not Status.STALE_INTENT
+        asked = frame.intent if frame and drives and moves else None
+        return {"drivers": drivers(asked, self._model, view.task.tools, view.state.q)}
 
     def _controlled(self, view: View) -> dict[str, Any]:
         """Return how the controller fares, and where intent and plan lead.
@@ -182,9 +144,10 @@ class Snapshots:
         status = frame.diagnostics.status
         shown["undos"], shown["status"] = frame.undos, status.value
         shown["reason"] = reason(status, self._env.plant.contacts, q, model.description)
-        hands = hands_ahead(model, frame.intent, view.task.tools, q)
+        asked = of_person(frame.intent)
+        hands = hands_ahead(model, asked, view.task.tools, q)
         shown["ghosts"] = [_numbers(hand) if hand else [] for hand in hands]
-        if (base := base_ahead(model, frame.intent, q)) is not None:
+        if (base := base_ahead(model, asked, q)) is not None:
             shown["ghost_base"] = np.round(base, 3).tolist()
         if frame.plan is not None:
             path, _ = frame.plan.path(q)

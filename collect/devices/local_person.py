@@ -79,6 +79,11 @@ class LocalPerson:
         return self._card
 
     @property
+    def person(self) -> Person:
+        """Whoever steers."""
+        return self._person
+
+    @property
     def practises(self) -> bool:
         """Whether the episode is not to be saved."""
         return self._person.practises

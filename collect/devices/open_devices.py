@@ -91,7 +91,8 @@ def _person(
     follower: Follower | None = None,
 ) -> LocalPerson:
     """Return the person, their devices opened; where one cannot be, those before are given back."""
-    person = Person(env.model, modes, config.mode_name)
+    alone = config.policy and not control_of([main.controls], HOLD)  # with no dead-man to let go of
+    person = Person(env.model, modes, config.mode_name, supervises=bool(alone))
     person.ask(Ask("frame", "base"))
     with ExitStack() as stack:
         for reader in filter(None, (main, beside)):

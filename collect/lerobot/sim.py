@@ -85,8 +85,10 @@ class Uncalibrated:
 class HandrailSim(Uncalibrated, Robot):
     """A robot in MuJoCo with a task; `handrail_sim` in LeRobot's commands.
 
-    Every `send_action` moves it for one period. An action that is not finite brakes, and is counted. When
-    `lerobot-rollout` has led the joints back to where they were at connect(), the next scene begins.
+    Every `send_action` moves it for one period. An action that is not finite brakes, and is counted. The same
+    action once more (the same object, not only the same numbers) is how LeRobot pauses. It is a velocity, so
+    the robot brakes, and time stands still. When `lerobot-rollout` has led the joints back to where they were
+    at connect(), the next scene begins.
 
     Args:
         config: its settings.
@@ -100,6 +102,7 @@ class HandrailSim(Uncalibrated, Robot):
         scene: number of the episode's beginning: the same number, the same beginning.
         episodes: how many have begun.
         frame: what happened in the last period; None before any.
+        watch: is told of every action whether it is the same one once more; returns a button, or "".
     """
 
     config_class = HandrailSimConfig
@@ -118,6 +121,8 @@ class HandrailSim(Uncalibrated, Robot):
         self.cameras = dict.fromkeys(self.env.cameras)  # LeRobot counts them
         self.scene, self.episodes, self.frame = -1, 0, None
         self._driven, self._led = False, None
+        self.watch: Callable[[bool], str] = lambda repeated: ""
+        self._given: tuple[dict[str, Any], dict[str, Any]] | None = None
         self._pace, self._open = Pace(self.env.period), ExitStack()
         _newest[:] = [weakref.ref(self)]
 
@@ -177,8 +182,8 @@ class HandrailSim(Uncalibrated, Robot):
         """Do what an action asks for, for one period; return it as it was understood.
 
         A button beside the channels begins another episode (`handrail.next`), the same one again
-        (`handrail.again`), or brakes and lets time stand still (`handrail.hold`). Positions of all joints
-        (`x.pos`, …) without any channel lead the joints there.
+        (`handrail.again`), or brakes and lets time stand still (`handrail.hold`); so does the same action
+        once more. Positions of all joints (`x.pos`, …) without any channel lead the joints there.
         """
         self._check_connected()
         if self._config.realtime:
@@ -187,7 +192,10 @@ class HandrailSim(Uncalibrated, Robot):
             self._lead(self._positions(action))
             return action
         numbers = self.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
-        button = pressed(action)
+        repeated = self._given is not None and action is self._given[0] and action == self._given[1]
+        if pressed(action) != HOLD:  # whoever holds between two of the same, wants nothing new
+            self._given = action, dict(action)
+        button = self.watch(repeated) or (HOLD if repeated else pressed(action))
         if button in (NEXT, AGAIN):
             self._begin(self.scene + (button == NEXT))
         elif button == HOLD:

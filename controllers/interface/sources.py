@@ -1,15 +1,16 @@
 """Several sources ask at once, each with its own mask, weights and prediction: intents as one."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.arrays import BoolArray, FloatArray, frozen
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Prediction, after, constant
 
-PERSON, POLICY = "person", "policy"  # names of the sources of a robot that both steer
+PERSON, POLICY = "person", "policy"  # names of the two that take-overs have
 _ROUNDING = 1e-9  # of a time [s]
 
 
@@ -17,19 +18,43 @@ _ROUNDING = 1e-9  # of a time [s]
 class Source:
     """One that asks: a person, a policy, a script."""
 
-    name: str  # which one; its prediction is remembered by it
+    name: str  # which one; what the controller's Ψ heard of it is remembered by it
     intent: Intent  # what it asks for
     weight: float | FloatArray = 1.0  # w ≥ 0 of its tracking term, one or one a channel, (m,)
-    predict: Prediction | None = None  # Ψ of this source; the controller's by default
+    predict: Prediction | None = (
+        None  # Ψ of this source, which remembers nothing; the controller's by default
+    )
 
     def share(self) -> FloatArray:
         """Return its weight on each channel, 0 where it owns none, (m,)."""
         return np.where(self.intent.mask, self.weight, 0.0)
 
-    @property
-    def is_active(self) -> bool:
-        """Whether it has a weight on some channel that it owns."""
-        return bool(np.any(self.intent.mask & (np.asarray(self.weight) != 0.0)))
+
+class Term(NamedTuple):
+    """A source that has some weight, and its part of all weight on each channel, (m,)."""
+
+    source: Source
+    part: FloatArray
+    alone: BoolArray | None  # where it has a part, if that is all of the weight everywhere, (m,)
+
+    @classmethod
+    def of(cls, source: Source, share: FloatArray, total: FloatArray) -> "Term":
+        """Return the term of a source with its share of a total, (m,) each."""
+        part = np.divide(share, total, out=np.zeros_like(total), where=total > 0.0)
+        owned = part > 0.0
+        return cls(source, part, owned if np.all(part[owned] == 1.0) else None)
+
+    def add(self, values: FloatArray, mean: FloatArray, largest: FloatArray | None = None) -> None:
+        """Add its part of values, (…, m), cut to ± largest first, to a weighted mean.
+
+        What it has alone is left as it is: nobody's part of it has to be cut to compare.
+        """
+        if self.alone is not None:
+            np.copyto(mean, values, where=self.alone)
+            return
+        if largest is not None:
+            values = np.minimum(np.maximum(values, -largest), largest)
+        mean += self.part * np.where(self.part > 0.0, values, 0.0)
 
 
 @dataclass(frozen=True)
@@ -42,7 +67,9 @@ class Intents(Intent):
     """
 
     sources: tuple[Source, ...] = ()
-    share: FloatArray = field(default_factory=lambda: np.ones(0))  # W, (m,)
+    terms: tuple[Term, ...] = ()  # of the sources that count
+    share: FloatArray | None = None  # W, (m,); None where it is 1 wherever the mask is true
+    last: float = 0.0  # when the last of those that count asked [s]
     of_grippers: tuple[str, ...] = ()  # name of the source that owns each gripper
 
     @classmethod
@@ -60,31 +87,33 @@ class Intents(Intent):
         size = len(base.values)
         owners = [source for source in sources if np.any(source.intent.mask) and np.any(source.weight)]
         usable = all(_fits(source, base) for source in owners)
-        active = tuple(source for source in owners if source.is_active) if usable else ()
-        shares = [source.share() for source in active]
-        total = np.sum([np.zeros(size), *shares], axis=0) if usable else np.ones(size)
-        values = merged([source.intent.values for source in active], shares, size)
+        shares = [(source, source.share()) for source in owners] if usable else []
+        active = [(source, share) for source, share in shares if share.any()]
+        total = np.sum([np.zeros(size), *(share for _, share in active)], axis=0)
+        terms = tuple(Term.of(source, share, total) for source, share in active)
+        values = np.zeros(size)
+        for term in terms:
+            term.add(term.source.intent.values, values)
+        times = [source.intent.time for source, _ in active] or [base.time]
+        mask = total > 0.0
         return cls(
             values=values if usable else np.full(size, np.nan),
-            mask=total > 0.0,
+            mask=mask if usable else np.ones(size, dtype=bool),
             grippers=grippers,
             mode=base.mode,
-            time=min((source.intent.time for source in active), default=base.time),
+            time=min(times),
             frames=base.frames,
             raw=base.raw,
             sources=tuple(sources) if usable else (),
-            share=frozen(total),
+            terms=terms,
+            share=None if np.all(total[mask] == 1.0) else frozen(total),
+            last=max(times),
         )
 
     @property
-    def active(self) -> tuple[Source, ...]:
-        """The sources that own something, with some weight."""
-        return tuple(source for source in self.sources if source.is_active)
-
-    @property
     def newest(self) -> float:
-        """When the last of these asked [s]."""
-        return max((source.intent.time for source in self.active), default=self.time)
+        """When the last of those that count asked [s]."""
+        return self.last
 
     def source(self, name: str) -> Source | None:
         """Return a source by its name, if it is there."""
@@ -95,64 +124,48 @@ def _fits(source: Source, base: Intent) -> bool:
     """Whether a source can be in a sum with others: sizes, frames, a weight that is a number, values."""
     intent, weight = source.intent, np.asarray(source.weight)
     sizes = intent.values.shape == base.values.shape and weight.shape in ((), base.values.shape)
-    frames = intent.frames is base.frames or np.array_equal(intent.frames.parameters, base.frames.parameters)
-    return sizes and frames and intent.is_finite and bool(np.all(np.isfinite(weight) & (weight >= 0.0)))
-
-
-def merged(values: Sequence[FloatArray], shares: Sequence[FloatArray], size: int) -> FloatArray:
-    """Return the weighted mean of values, (…, m) each, with shares, (m,) each; 0 where nobody has a share.
-
-    A single source's values are left as they are, bit for bit.
-    """
-    if not values:
-        return np.zeros(size)
-    if len(values) == 1:
-        return np.where(shares[0] > 0.0, values[0], 0.0)
-    total = np.sum(shares, axis=0)
-    part = [np.divide(share, total, out=np.zeros_like(total), where=total > 0.0) for share in shares]
-    terms = [np.where(each > 0.0, each * value, 0.0) for each, value in zip(part, values, strict=True)]
-    return np.sum(terms, axis=0)
+    same = intent.frames is base.frames
+    same = same or np.array_equal(intent.frames.parameters, base.frames.parameters)
+    return sizes and same and intent.is_finite and bool(np.all(np.isfinite(weight) & (weight >= 0.0)))
 
 
 @dataclass(frozen=True)
 class OfSources:
     """Ψ of several sources: the weighted mean of each one's own prediction, cut to what is possible first.
 
-    Of a plain intent it is the controller's Ψ. Each source's own memory begins when it first asks.
+    Of a plain intent it is the controller's Ψ. What that remembers of a source begins when it first asks.
     """
 
     predict: Prediction  # the controller's Ψ
     largest: FloatArray  # what a command of each channel is cut to, (m,)
-    first: Prediction | None = None  # the controller's Ψ before it heard anything
+    first: Prediction | None = (
+        None  # the controller's Ψ before it heard anything; None where that is `predict`
+    )
     own: tuple[tuple[str, Prediction], ...] = ()  # by source
 
     def after(self, intent: Intent) -> "OfSources":
         """Return the prediction that has heard an intent; itself where nothing is remembered."""
+        if not hasattr(self.predict, "after"):
+            return self
+        first = self.first or self.predict
         if not isinstance(intent, Intents):
-            heard = after(self.predict, intent)
-            return (
-                self
-                if heard is self.predict
-                else replace(self, predict=heard, first=self.first or self.predict)
-            )
-        fresh, known = self.first or self.predict, dict(self.own)
-        own = {
-            each.name: after(each.predict or known.get(each.name, fresh), each.intent)
-            for each in intent.active
-        }
-        return replace(self, first=fresh, own=tuple((known | own).items()))
+            return replace(self, predict=after(self.predict, intent), first=first)
+        heard = dict(self.own)
+        for source, *_ in intent.terms:
+            heard[source.name] = after(heard.get(source.name, first), source.intent)
+        return replace(self, first=first, own=tuple(heard.items()))
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
         if not isinstance(intent, Intents):
             return self.predict(intent, times)
-        own, cut = dict(self.own), self.largest
-        values = [
-            np.clip((each.predict or own.get(each.name, self.predict))(each.intent, times), -cut, cut)
-            for each in intent.active
-        ]
-        shares = [each.share() for each in intent.active]
-        return merged(values, shares, len(cut)) if values else constant(intent, times)
+        own, predicted = dict(self.own), np.zeros((len(times), len(self.largest)))
+        for term in intent.terms:
+            source = term.source
+            predict = source.predict or own.get(source.name, self.predict)
+            values = source.intent.values if predict is constant else predict(source.intent, times)
+            term.add(values, predicted, self.largest)
+        return predicted
 
 
 @dataclass(frozen=True)
@@ -167,5 +180,5 @@ class Preview:
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        index = np.searchsorted(self.times, intent.time + times + _ROUNDING, side="right") - 1
-        return self.values[np.clip(index, 0, len(self.values) - 1)]
+        index = self.times.searchsorted(intent.time + times + _ROUNDING, side="right") - 1
+        return self.values[np.maximum(index, 0)]

@@ -17,7 +17,8 @@ _USUAL = Frames()
 def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent | None:
     """Return the intent as it is meant in the usual frames at q, (n,); None where a mask cannot be turned.
 
-    A mask that has some axes of a translation or a rotation, but not all three, is of its own frame alone.
+    A mask that has some axes of a translation or a rotation, but not all three, is of its own frame alone; so
+    is the translation of another tool point without the rotation.
     Unknown frames, and values of another size, stay: the controller brakes.
     """
     channels, frames = Channels.of(model.description), intent.frames
@@ -35,12 +36,14 @@ def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent 
         poses, places = [*poses, poses[0]], [*places, channels.pair_slice]
     for hand, (pose, place) in enumerate(zip(poses, places, strict=True)):
         parts = [slice(place.start + first, place.start + first + 3) for first in (0, 3)]
-        if any(np.ptp(intent.mask[part].astype(int)) for part in parts):
+        moves, turns = (intent.mask[part] for part in parts)
+        partly = any(each.any() != each.all() for each in (moves, turns))
+        if partly or (frames.point.any() and moves.any() and not turns.any()):
             return None
         rotation = np.asarray(pose.rotation)
         if frames.tool == "tool":
             for part in parts:
                 values[part] = rotation @ values[part]
         if hand < len(model.description.hands):  # v of the tool point, of the one that moves with it
-            values[parts[0]] -= np.cross(values[parts[1]], rotation @ frames.point) * intent.mask[place.start]
+            values[parts[0]] -= np.cross(values[parts[1]], rotation @ frames.point)
     return replace(intent, values=values, frames=_USUAL)

@@ -67,7 +67,7 @@ class ProblemBuilder:
         if loop.rest is not None:
             reference[:, self._posture] = np.where(np.isnan(loop.rest), self._home, loop.rest)
         weights = self._weights_of(intent.mask.tobytes())
-        if isinstance(intent, Intents):
+        if isinstance(intent, Intents) and intent.share is not None:
             weights = weights.copy()
             weights[:, : self._channels.size] *= intent.share
         sent = state.sent(self._limits)

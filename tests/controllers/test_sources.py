@@ -114,6 +114,19 @@ def test_a_source_without_weight_changes_nothing_even_if_it_is_stale():
     assert np.array_equal(found.velocities, MaskedMpc(MODEL).update(REST, ask).velocities)
 
 
+def test_what_a_source_does_not_own_means_nothing():
+    """An infinite value under the mask, a source of another size that owns nothing."""
+    one, other = intent(np.full(SIZE, 0.2), "ee"), intent(np.full(SIZE, 0.1), "ee", "base")
+    wild = replace(one, values=np.where(one.mask, one.values, np.inf))
+    nothing = Source("c", Intent(np.ones(3), np.zeros(3, bool), time=0.05), np.ones(SIZE))
+    clean = together(Source("a", one), Source("b", other))
+    found = together(Source("a", wild), Source("b", other), nothing)
+    assert np.array_equal(found.values, clean.values)
+    commands = [MaskedMpc(MODEL).update(REST, each) for each in (found, clean)]
+    assert commands[0].diagnostics.status is Status.OK
+    assert np.array_equal(commands[0].velocities, commands[1].velocities)
+
+
 def test_each_source_has_its_own_prediction():
     """A policy's chunk is in the reference of each stage; a person's command is held."""
     person = intent(np.full(SIZE, 0.1), "base")

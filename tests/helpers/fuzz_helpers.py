@@ -7,7 +7,7 @@ Contacts and distances are MuJoCo's too.
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.sources import Intents, Source
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.robot.model import RobotModel
@@ -145,6 +146,35 @@ class RudeOperator:
         return Intent(values, mask, self._grippers, time=stamp, frames=frames)
 
 
+class RudePair:
+    """Two rude sources as one intent, with random weights; the second is now and then a second late, or dead.
+
+    They mean the same frames, but for trouble: else their sum is no intent, and the robot only brakes.
+    """
+
+    def __init__(self, channels, limits, rng):
+        self._both = [RudeOperator(channels, limits, rng) for _ in range(2)]
+        self._rng, self._size, self._until = rng, channels.size, 0.0
+
+    def intent(self, time):
+        rng = self._rng
+        if time >= self._until:
+            self._until = time + rng.uniform(0.05, 1.0)
+            kinds = [0.0, 0.3, 1.0, 10.0, rng.random(self._size), 1.0 * (rng.random(self._size) < 0.5)]
+            self._weights = [kinds[rng.integers(len(kinds))] for _ in range(2)]
+            self._late = rng.choice([0.0, 1.0, time], p=[0.9, 0.05, 0.05])
+        first, second = (each.intent(time) for each in self._both)
+        if rng.random() < 0.99:
+            second = replace(second, frames=first.frames)
+        second = replace(second, time=min(second.time, time - self._late) if self._late else second.time)
+        weights = self._weights if rng.random() < 0.99 else [rng.choice([np.nan, -1.0, np.inf]), 1.0]
+        sources = [
+            Source(name, each, weight)
+            for name, each, weight in zip(("person", "policy"), (first, second), weights, strict=True)
+        ]
+        return Intents.of(sources, first.grippers, first)
+
+
 @contextmanager
 def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
     """Let the solver fail at random, now and then for a while."""
@@ -163,7 +193,13 @@ def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
 
 
 def run(
-    model: RobotModel, controller, seed: int, seconds: float, movers: int = 0, gap: float = PERIOD
+    model: RobotModel,
+    controller,
+    seed: int,
+    seconds: float,
+    movers: int = 0,
+    gap: float = PERIOD,
+    operator: type = RudeOperator,
 ) -> FuzzResult:
     """Drive a robot through a scene of a seed with whatever comes; return what happened.
 
@@ -174,13 +210,14 @@ def run(
         seconds: how long.
         movers: how many things move.
         gap: between two updates, a multiple of the robot's period [s].
+        operator: who asks, of its channels, limits and a generator.
     """
     rng = np.random.default_rng([seed, movers])
     scene, q = cluttered(model, movers, rng)
     simulation = Simulation(model, scene, q, PERIOD, gate=OpenGate(model, PERIOD))
     controller.reset(scene.obstacles(0.0))
     limits, result = model.description.limits, FuzzResult()
-    rude = RudeOperator(controller.channels, limits, rng)
+    rude = operator(controller.channels, limits, rng)
     moving = {item.name for item in scene.movers}
     standing = {item.name for item in scene.objects} - moving | {"floor"}
     previous, every = np.zeros(model.size), round(gap / PERIOD)

@@ -11,6 +11,7 @@ from handrail.collect.config import RecordConfig, SessionConfig
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.by_input import ByMask
+from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.collect.operators.shared.shared_operator import SharedOperator
 from handrail.collect.session.build import build_controller, build_env, build_mode, session_features
 from handrail.collect.session.recorder import Recorder
@@ -44,7 +45,9 @@ class Person:
         values[self.channels.names.index("ee.vz")] = 0.1 * (self.frame in HAND)
         values[self.channels.names.index("base.vx")] = 0.1 * (self.frame in BASE)
         mask = self.channels.mask("base", "ee")
-        return Intent(values, mask, (float(self.frame >= CLOSES),), "ee", view.state.time)
+        raw = RawInput(axes=int(np.count_nonzero(values)), device="stick")
+        closes = (float(self.frame >= CLOSES),)
+        return Intent(values, mask, closes, "ee", view.state.time, raw=raw)
 
 
 @dataclass
@@ -52,7 +55,6 @@ class Policy:
     """Wants one thing throughout; now and then it has no usable answer."""
 
     channels: Channels
-    ahead = None
     doubt = 0.0
 
     def reset(self, view, rng):
@@ -60,6 +62,9 @@ class Policy:
 
     def replan(self):
         pass
+
+    def chunk(self):
+        return []
 
     def act(self, view):
         frame = round(view.state.time * FPS)
@@ -75,7 +80,7 @@ def record_takeovers(root: Path, episodes: int = 2, physics: bool = False, share
     config = replace(CONFIG, physics=physics)
     with closing(build_env(config, FPS)) as env:
         mode, channels = build_mode(config, env.model), Channels.of(env.model.description)
-        arbiter = ByMask(Groups(channels), HANDBACK)
+        arbiter = ByMask(Groups(channels), ArbiterSettings(handback=HANDBACK))
         operator = SharedOperator(Person(channels), Policy(channels), arbiter, env.model)
         recorder = Recorder("reach", session_columns(RecordConfig(**vars(config))))
         controller = build_controller(mode, env.model, FPS, config.task)

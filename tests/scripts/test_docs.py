@@ -19,6 +19,7 @@ from handrail.collect.session.perturbations import DEFAULTS
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.interface.command import Status
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.recording.frames import SHARED_COLUMNS
 from handrail.policies.imitation.evaluation.config import PROTECTIONS
 from handrail.scripts import cli
 from handrail.scripts.bench.goal_reaching.config import BASELINES, PROFILES
@@ -129,6 +130,7 @@ TABLES = {
     ("comparison", "Quality metrics"): lambda: {metric.name for metric in METRICS},
     ("recording", "Flags of `handrail-record`"): lambda: flags(RecordConfig),
     ("recording", "What is recorded"): columns,
+    ("takeover", "What is recorded, and how to train on it"): lambda: {c.name for c in SHARED_COLUMNS},
     ("recording", "Exit codes"): lambda: set(map(str, (0, cli.FAILED, cli.BAD_INPUT, cli.INTERRUPTED))),
     ("safety", "When the robot brakes"): lambda: {status.value for status in Status},
 }

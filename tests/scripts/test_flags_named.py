@@ -29,7 +29,7 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "accelerate launch": "--multi_gpu",
     "ray start": "--head --port --address --disable-usage-stats",
 }
-GROUPS = {"--human", "--cockpit", "--teleop", "--client", "--dataset"}  # of flags: --human.*
+GROUPS = {"--human", "--arbitration", "--cockpit", "--teleop", "--client", "--dataset"}  # of flags: --human.*
 # what starts Chromium, builds a wheel and the like
 FOREIGN = {
     "controllers/core/building.py",

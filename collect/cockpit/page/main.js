@@ -1,5 +1,6 @@
 // Puts the page together: inputs up many times a second, the newest picture down.
 import { Decision } from "./decision.js";
+import { driverWords } from "./drivers.js";
 import { Episodes } from "./episodes.js";
 import { Gamepad } from "./gamepad.js";
 import { Help } from "./help.js";
@@ -56,6 +57,7 @@ const link = new Link({
     groups = digitGroups(stage);
     if (inputs.grips.length !== stage.hands.length) inputs.grips = stage.hands.map(() => false);
     for (const each of [panels, masks, sliders, episodes, study, decision, xr]) each.stage(stage);
+    document.body.classList.toggle("beside", Boolean(stage.policy));
     hint();
     label();
     await view.stage(stage);
@@ -121,8 +123,8 @@ document.addEventListener("click", (event) => { // the mouse leaves no focus beh
   if (event.detail > 0) event.target.closest("button, summary, input[type=checkbox], input[type=range]")?.blur();
 });
 
-function ownedBodies() {
-  const has = (prefix) => [...inputs.owned].some((name) => name.startsWith(prefix));
+function bodiesOf(owned) {
+  const has = (prefix) => [...owned].some((name) => name.startsWith(prefix));
   const bodies = stage.shapes.bodies, lit = new Set();
   if (has("base")) lit.add("planar_base"); // by its twist or its joints
   for (const { name: hand } of stage.hands) {
@@ -130,7 +132,7 @@ function ownedBodies() {
     if (!has(`${hand || "ee"}.`) && !(hand && has("pair."))) continue;
     for (const name of bodies) if (name === `${prefix}gripper` || name.startsWith(`${prefix}finger`)) lit.add(name);
   }
-  for (const name of inputs.owned) if (name.startsWith("joint.")) lit.add(`${name.slice(6)}_body`);
+  for (const name of owned) if (name.startsWith("joint.")) lit.add(`${name.slice(6)}_body`);
   return lit;
 }
 
@@ -151,10 +153,21 @@ function own() {
   inputs.owned = names;
   inputs.bank = 0;
   inputs.turns = false;
-  view.light_up(ownedBodies());
+  if (!frame.drivers) view.light_up(bodiesOf(inputs.owned));
   help.draw();
   hint();
   label();
+}
+
+// Beside a policy what each drives now is lit, and said.
+function sayDrivers() {
+  byId("drivers").hidden = !frame.drivers;
+  if (!frame.drivers) return;
+  const said = driverWords(frame, masks.groups, stage, { start: keyName(inputs.mapping.actions.start ?? "") });
+  if (byId("drivers").textContent !== said) byId("drivers").textContent = said;
+  byId("drivers").classList.toggle("mine", frame.drivers.person.length > 0);
+  const [mine, its] = ["person", "policy"].map((who) => bodiesOf(new Set(frame.drivers[who].map((index) => stage.channels[index]))));
+  if ([...mine, "", ...its].join() !== [...view.owned, "", ...view.its].join()) view.light_up(mine, its);
 }
 
 function show() {
@@ -175,6 +188,7 @@ function tell() {
   told = frame;
   own();
   for (const each of [masks, panels, episodes, decision, xr]) each.frame(frame);
+  sayDrivers();
   panels.way(way());
   sliders.frame(frame, inputs.owned);
   touch.label();

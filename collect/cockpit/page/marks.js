@@ -1,10 +1,11 @@
 // What is asked and what is made of it, drawn into the scene: ghosts, the plan, the nearest pair. Each has a line of
-// its own kind, so that nobody needs the colours: the ghosts are hollow, the plan is solid, the nearest pair is dotted.
+// its own kind, so that nobody needs the colours: the ghosts are hollow, the plan is solid, the nearest pair is dotted, a
+// policy's plan is a row of balls.
 import { THREE } from "./three.min.js";
 import { place } from "./scene.js";
 import { centimetres } from "./way.js";
 
-export const ASKED = 0xffa000, PLAN = 0x2f7df6, NEAR = 0xe5484d;
+export const ASKED = 0xffa000, PLAN = 0x2f7df6, NEAR = 0xe5484d, POLICY = 0x00f0b4;
 const ON_FLOOR = 0.006; // [m]
 
 function line(scene, colour, dash) {
@@ -57,6 +58,9 @@ export class Marks {
       new THREE.SphereGeometry(0.012, 12, 8), new THREE.MeshBasicMaterial({ color: NEAR, depthTest: false, transparent: true }),
     ));
     for (const end of this.ends) end.renderOrder = 4;
+    this.ball = this.ends[0].clone();
+    this.ball.material = new THREE.MeshBasicMaterial({ color: POLICY, depthTest: false, transparent: true });
+    this.balls = []; // along a policy's plan
     this.hands = []; // of each: its plan, the way that is asked for, its ghost and the bodies that it copies
     scene.add(...this.ends);
   }
@@ -113,11 +117,22 @@ export class Marks {
     });
     drawTube(this.track, frame.track.map(([x, y]) => new THREE.Vector3(x, y, ON_FLOOR)), this.scale);
     this.leadBase(frame);
+    const { leads = [], lead_base = [] } = frame.drivers ?? {};
+    this.row([...leads.flat(), ...lead_base.map(([x, y]) => [x, y, ON_FLOOR])]);
     const points = frame.nearest?.points ?? [];
     const ends = points.length ? [new THREE.Vector3(...points.slice(0, 3)), new THREE.Vector3(...points.slice(3))] : [];
     draw(this.near, ends);
     this.ends.forEach((end, index) => { end.visible = ends.length > 0; if (end.visible) end.position.copy(ends[index]); });
     this.said = frame.nearest ? `${centimetres(frame.nearest.distance)} cm` : "";
+  }
+
+  row(points) {
+    while (this.balls.length < points.length) this.scene.add(this.balls[this.balls.push(this.ball.clone()) - 1]);
+    this.balls.forEach((ball, index) => {
+      ball.visible = index < points.length;
+      if (ball.visible) ball.position.set(...points[index]);
+      ball.scale.setScalar(this.scale);
+    });
   }
 
   // Every part of a hand stands to its ghost as it stands to the hand now.
@@ -168,6 +183,7 @@ export class Marks {
   hide() {
     const ofHands = this.hands.flatMap(({ path, asked, ghost }) => [path, asked, ghost]);
     for (const each of [this.track, this.near, this.outline, ...this.ends, ...ofHands]) each.visible = false;
+    this.row([]);
     this.said = "";
   }
 }

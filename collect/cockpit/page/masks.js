@@ -1,4 +1,5 @@
 // Any mask: which parts the person owns, by group, joint or single channel; choosing a mode goes back.
+import { driverOf } from "./drivers.js";
 import { jointName, shortName, wordsOf } from "./keymap.js";
 
 const OF_PAIR = ["pair", "apart"];
@@ -32,6 +33,7 @@ export class Masks {
       name, channels: stage.channels.flatMap((channel, index) => (parts.includes(channel.split(".")[0]) ? [index] : [])),
     })).filter(({ channels }) => channels.length);
     this.parts = this.groups.map(({ name, channels }) => toggle(`○ ${name}: robot`, `you own the ${name}`, () => this.flip(channels)));
+    byId("owned-title").textContent = stage.policy ? "You can take" : "You own";
     byId("owned").replaceChildren(...this.parts);
     this.single = stage.channels.map((name, index) => toggle(shortName(name), wordsOf(name)?.join(", ") ?? jointName(name), () => this.flip([index])));
     byId("channels").replaceChildren(...this.groups.map(({ name, channels }) => {
@@ -62,7 +64,7 @@ export class Masks {
     this.groups.forEach(({ name, channels }, index) => {
       const count = channels.filter((each) => this.mine.has(each)).length;
       const [mark, who, pressed] = count === channels.length ? ["●", "you", "true"] : count ? ["◐", "some", "mixed"] : ["○", "robot", "false"];
-      const words = `${mark} ${name}: ${who}`;
+      const words = (frame.drivers && frame.phase === "driving" ? driverOf(frame.drivers, channels) : [mark, who]).join(` ${name}: `);
       if (this.parts[index].textContent !== words) this.parts[index].textContent = words;
       this.parts[index].setAttribute("aria-pressed", pressed);
     });

@@ -5,6 +5,7 @@ import { keep, recall } from "./store.js";
 const LEGEND = [ // class of the sample, words
   ["ghost", "you lead the hand"], ["outline", "you lead the base"], ["plan", "the robot's plan"],
   ["near", "nearest pair"], ["drop", "straight below"], ["within", "near enough"], ["yours", "glows: yours"],
+  ["its", "glows: the policy's"], ["lead", "the policy's plan"],
 ];
 
 const OVER = ["hint", "decision"]; // what else may lie over it

@@ -4,7 +4,7 @@ import { AimMarks } from "./aim.js";
 import { Cameras } from "./cameras.js";
 import { Hands } from "./hands.js";
 import { Headset } from "./headset.js";
-import { Marks } from "./marks.js";
+import { Marks, POLICY } from "./marks.js";
 import { Playback } from "./playback.js";
 import { Ground, forgetBodies, makeBodies, place } from "./scene.js";
 import { build } from "./tools.js";
@@ -40,7 +40,7 @@ export class View {
     this.playback = new Playback(this, this.tools.playback);
     this.choose(this.cameras.choice);
     this.bodies = [];
-    this.owned = new Set();
+    this.owned = this.its = new Set();
     this.isReady = false; // nobody drives who does not see
     const watch = new ResizeObserver(() => this.fit());
     for (const each of [canvas, ...this.tools.over]) watch.observe(each);
@@ -56,7 +56,7 @@ export class View {
     this.hands.stage(stage, bodies);
     this.aimMarks.scale = stage.scale;
     this.cameras.stage(stage);
-    this.light_up(this.owned);
+    this.light_up(this.owned, this.its);
     if (this.played) return;
     this.scene.add(...bodies);
     this.rehearse();
@@ -80,12 +80,12 @@ export class View {
     this.stale = true;
   }
 
-  // Lights the bodies that the operator owns.
-  light_up(owned) {
-    this.owned = owned;
+  // Lights the bodies that the operator owns, and those that a policy drives.
+  light_up(owned, its = new Set()) {
+    Object.assign(this, { owned, its });
     for (const body of this.bodies) {
       for (const { material } of body.children) {
-        material.emissive.set(owned.has(body.name) ? OWNED : 0);
+        material.emissive.set(owned.has(body.name) ? OWNED : its.has(body.name) ? POLICY : 0);
         material.emissiveIntensity = 0.22;
       }
     }

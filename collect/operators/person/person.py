@@ -45,6 +45,8 @@ class Person:
         modes: that one can change to, by name.
         first: the mode at the beginning.
         clock: of inputs [s].
+        supervises: whether something else moves the robot while all is let go, and no dead-man is held: then
+            what was lost is paused, and goes on with Start alone.
 
     Attributes:
         setting: what the operator has chosen.
@@ -61,7 +63,9 @@ class Person:
         modes: Mapping[str, TeleopMode],
         first: str,
         clock: Callable[[], float] = time.monotonic,
+        supervises: bool = False,
     ) -> None:
+        self._lost = Phase.PAUSED if supervises else Phase.LOST
         self.meaning = InputMeaning(model, modes[first])
         self.modes, self._clock = modes, clock
         self.setting, self.phase = Setting(modes[first], hand=model.hand.name), Phase.READY
@@ -137,7 +141,7 @@ class Person:
             return event
         driven = self._is_driven()
         if self.phase is Phase.DRIVING and not driven:
-            self.phase, self._armed = Phase.LOST, False
+            self.phase, self._armed = self._lost, False
         elif self.phase is Phase.LOST and driven and self._armed:
             self.phase = Phase.DRIVING
         if self.phase is not Phase.DRIVING or self.inputs is None:

@@ -21,7 +21,9 @@ class Wishes:
     person: Intent  # in the usual frames
     policy: Intent | None  # the same; None where the policy has no usable answer
     realised: FloatArray  # the velocity of every channel as it is, (m,)
-    doubt: float = 0.0  # how unsure the policy says it is; 0 of one that does not say
+    doubt: float = 0.0
+    """How unsure the policy says it is: the standard deviation of the velocities that it could as well wish
+    for, over full speed; 0 of one that does not say."""
 
 
 class Shares(NamedTuple):
@@ -124,9 +126,10 @@ class Lately:
 
     def reset(self) -> None:
         """Begin an episode: nothing is the person's."""
-        self._until = np.full(self._groups.channels.size, -np.inf)
+        self._last = np.full(self._groups.channels.size, -np.inf)
 
     def owned(self, wishes: Wishes) -> BoolArray:
-        """Return the channels that are the person's now, (m,)."""
-        self._until[self._groups.moved(wishes.person)] = wishes.time + self._handback
-        return wishes.person.mask & (self._until > wishes.time)
+        """Return the channels that are the person's now, (m,); a clock that was set back changes nothing."""
+        moved = self._groups.moved(wishes.person)
+        self._last[moved] = wishes.time
+        return moved | (wishes.person.mask & (np.abs(wishes.time - self._last) < self._handback))

@@ -3,9 +3,7 @@
 import numpy as np
 
 from handrail.collect.operators.shared.arbiter import Groups, Lately, Shares, Wishes
-from handrail.controllers.errors import HandrailError
-
-HANDBACK = 0.5  # after which what was moved last goes back to the policy [s]
+from handrail.collect.operators.shared.settings import ArbiterSettings
 
 
 class ByMask:
@@ -13,11 +11,11 @@ class ByMask:
 
     Args:
         groups: of the robot's channels.
-        handback: how long after a group was moved last [s].
+        settings: how long after a group was moved last.
     """
 
-    def __init__(self, groups: Groups, handback: float = HANDBACK) -> None:
-        self._groups, self._lately = groups, Lately(groups, handback)
+    def __init__(self, groups: Groups, settings: ArbiterSettings) -> None:
+        self._groups, self._lately = groups, Lately(groups, settings.handback)
 
     def reset(self) -> None:
         """Begin an episode."""
@@ -34,11 +32,11 @@ class Whole:
 
     Args:
         groups: of the robot's channels.
-        handback: how long after the last input [s].
+        settings: how long after the last input.
     """
 
-    def __init__(self, groups: Groups, handback: float = HANDBACK) -> None:
-        self._groups, self._lately = groups, Lately(groups, handback)
+    def __init__(self, groups: Groups, settings: ArbiterSettings) -> None:
+        self._groups, self._lately = groups, Lately(groups, settings.handback)
 
     def reset(self) -> None:
         """Begin an episode."""
@@ -58,14 +56,12 @@ class Blend:
 
     Args:
         groups: of the robot's channels.
-        alpha: α, the policy's share: 0 is `ByMask`, 1 the policy alone.
-        handback: how long after a group was moved last it counts as moved [s].
+        settings: α, the policy's share, and how long after a group was moved last it counts as moved.
     """
 
-    def __init__(self, groups: Groups, alpha: float = 0.5, handback: float = HANDBACK) -> None:
-        if not 0.0 <= alpha <= 1.0:
-            raise HandrailError(f"blend: expected a policy's share from 0 to 1, got {alpha:g}")
-        self._groups, self._alpha, self._lately = groups, alpha, Lately(groups, handback)
+    def __init__(self, groups: Groups, settings: ArbiterSettings) -> None:
+        self._groups, self._alpha = groups, settings.alpha
+        self._lately = Lately(groups, settings.handback)
 
     def reset(self) -> None:
         """Begin an episode."""
@@ -79,13 +75,3 @@ class Blend:
         opposed = owned & self._groups.taken(contested)
         person = np.where(opposed, 1.0 - self._alpha, 1.0) * owned
         return Shares(person, np.where(contested, self._alpha, 1.0))
-
-
-def by_mask(groups: Groups, settings: object) -> ByMask:
-    """Temporary."""
-    return ByMask(groups)
-
-
-def whole(groups: Groups, settings: object) -> Whole:
-    """Temporary."""
-    return Whole(groups)

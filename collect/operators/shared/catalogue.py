@@ -2,46 +2,40 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
-
-from msgspec import Meta
+from typing import Any
 
 from handrail.controllers.registry import Registry
-from handrail.controllers.typed import NonNegative, check_settings
-
-
-@dataclass(frozen=True)
-class ArbiterSettings:
-    """Numbers of the arbiters."""
-
-    handback: NonNegative = 0.5
-    """How long after it was moved last a channel stays the person's [s]."""
-    alpha: Annotated[float, Meta(ge=0, le=1)] = 0.5
-    """The policy's share in blend."""
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        check_settings(self, "--arbitration")
 
 
 @dataclass(frozen=True)
 class ArbiterSpec:
     """An arbiter: one entry makes it."""
 
-    name: str
+    name: str  # as on the command line, and what the dataset says of who decided
     build: Callable[..., Any] | str
-    help: str
+    """`(groups, settings) -> Arbiter`, or where that is, `module:name`. It gets the `Groups` of the robot's
+    channels and the `ArbiterSettings`."""
+    help: str  # one line
 
 
+_HERE = "handrail.collect.operators.shared"
 ARBITERS = Registry(
     "arbiter",
     ArbiterSpec,
     (
         ArbiterSpec(
-            "by_mask", "handrail.collect.operators.shared.by_input:by_mask", "what a person moves is theirs"
+            "by_mask", f"{_HERE}.by_input:ByMask", "the person has what they move, the policy keeps the rest"
+        ),
+        ArbiterSpec("whole", f"{_HERE}.by_input:Whole", "any input of the person takes the whole robot"),
+        ArbiterSpec("blend", f"{_HERE}.by_input:Blend", "where both ask, both are in the MPC's objective"),
+        ArbiterSpec(
+            "emics", f"{_HERE}.emics:emics", "the whole robot changes hands where it makes too little way"
         ),
         ArbiterSpec(
-            "whole", "handrail.collect.operators.shared.by_input:whole", "any input takes everything"
+            "hier_emics",
+            f"{_HERE}.emics:hier_emics",
+            "as emics, but never against a person with a purpose, nor to one who is away",
         ),
+        ArbiterSpec("risk", f"{_HERE}.risk:Risk", "as by_mask, but the policy lets go while it is unsure"),
     ),
 )

@@ -16,8 +16,8 @@ import numpy as np
 
 from handrail.collect.operators.operator import EpisodeEvent, Operator, View
 from handrail.collect.operators.shared.arbiter import Arbiter, Groups, Wishes
-from handrail.collect.operators.shared.by_input import HANDBACK
 from handrail.collect.operators.shared.planning import Planner
+from handrail.collect.operators.shared.settings import HANDBACK
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
@@ -30,9 +30,9 @@ from handrail.controllers.robot.model import RobotModel
 class SharedOperator:
     """A person (or a script) and a policy as one operator.
 
-    The policy plans anew when the person hands something back. A gripper is the person's while they have
-    something of its hand, or have changed it a moment ago; until they change it, it stays as it is. A change
-    closes what is open and opens what is closed.
+    The policy plans anew when it gets something back. A gripper is the person's while they have something of
+    its hand, or have changed it a moment ago, or the policy drives nothing; until they change it, it stays as
+    it is. A change closes what is open and opens what is closed. Where nobody drives, the robot brakes.
 
     Args:
         person: who supervises.
@@ -64,7 +64,7 @@ class SharedOperator:
         self._closed = [0.0] * self._hands  # how far each gripper is asked to be closed
         self._level: tuple[float, ...] = ()  # of each as the person's device says
         self._changed = [-np.inf] * self._hands  # when the person changed each [s]
-        self._owned = np.zeros(self._channels.size, dtype=bool)
+        self._held = np.zeros(self._channels.size, dtype=bool)  # what the policy gave up, or shares
         self._waits = False
 
     def act(self, view: View) -> Intent | EpisodeEvent:
@@ -78,39 +78,46 @@ class SharedOperator:
             self._waits = False
         asked = asked.of_hands(self._hands)
         wanted = self._wanted(view)
+        if not (asked.is_finite and asked.values.shape == (self._channels.size,) and asked.frames.are_known):
+            return asked  # the controller brakes
         person = in_usual_frames(asked, self._model, view.state.q)
-        if person is None or not (person.is_finite and person.frames.are_known and self._shares(asked.mode)):
-            return asked
+        if person is None or not self._shares(asked.mode):
+            self._held[:] = True
+            self._take_grippers(asked, self._held, view.state.time)
+            return replace(asked, grippers=tuple(self._closed))
         return self._merged(person, wanted, view)
 
     def _wanted(self, view: View) -> Intent | None:
         """Return what the policy wants; None of an answer that no controller accepts."""
-        wanted = self._policy.act(view)
-        fits = wanted.values.shape == (self._channels.size,) and wanted.is_finite
-        return wanted if fits else None
+        wanted = self._policy.act(view).of_hands(self._hands)
+        if not (
+            wanted.values.shape == (self._channels.size,) and wanted.is_finite and wanted.frames.are_known
+        ):
+            return None
+        return in_usual_frames(wanted, self._model, view.state.q)
 
     def _merged(self, person: Intent, policy: Intent | None, view: View) -> Intent:
         """Return the sum of both, by the arbiter's weights."""
         time = view.state.time
         realised = channel_matrix(self._model, self._channels, view.state.q) @ view.state.v
         shares = self._arbiter.shares(Wishes(time, person, policy, realised, self._policy.doubt))
-        owned = person.mask & (shares.person > 0.0)
-        if np.any(self._owned & ~owned):  # handed back: what was planned before led from elsewhere
+        owned, free = person.mask & (shares.person > 0.0), shares.policy > 0.0
+        held = owned | ~free
+        if np.any(self._held & ~held):  # handed back: what was planned before led from elsewhere
             self._policy.replan()
             policy = self._wanted(view)
-        self._owned = owned
-        mine = self._take_grippers(person, owned, time)
-        if policy is not None:
-            wanted = zip(self._closed, policy.of_hands(self._hands).grippers, mine, strict=True)
-            self._closed = [now if own else then for now, then, own in wanted]
+        self._held = held
+        drives = policy is not None and bool(np.any(policy.mask & free))
+        mine = [own or not drives for own in self._take_grippers(person, owned, time)]
         sources = [Source(PERSON, person, shares.person)]
         if policy is not None:
+            wanted = zip(self._closed, policy.grippers, mine, strict=True)
+            self._closed = [now if own else then for now, then, own in wanted]
             policy = replace(policy, mode=person.mode)
             sources.append(Source(POLICY, policy, shares.policy, self._ahead(policy)))
         intents = Intents.of(sources, tuple(self._closed), person)
-        if policy is None and not owned.any():  # nobody drives
-            intents = replace(intents, time=LONG_AGO)
-        return replace(intents, of_grippers=tuple(PERSON if own else POLICY for own in mine))
+        fresh = min(intents.time, person.time) if intents.mask.any() else LONG_AGO
+        return replace(intents, time=fresh, of_grippers=tuple(PERSON if own else POLICY for own in mine))
 
     def _ahead(self, now: Intent) -> Preview | None:
         """Return what the policy has planned, if it plans ahead."""
@@ -130,4 +137,4 @@ class SharedOperator:
                 same = round(level) == round(self._closed[hand])
                 self._closed[hand] = 1.0 - level if same else level
                 self._changed[hand] = time
-        return [own or time - then < HANDBACK for own, then in zip(has, self._changed, strict=True)]
+        return [own or abs(time - then) < HANDBACK for own, then in zip(has, self._changed, strict=True)]

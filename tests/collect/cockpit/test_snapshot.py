@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handrail.collect.cockpit.ahead import AHEAD, base_ahead, hands_ahead
 from handrail.collect.cockpit.episodes import DiskRoom
 from handrail.collect.cockpit.nearest import NearestPair
-from handrail.collect.cockpit.snapshot import AHEAD, STATUS, Snapshots, base_ahead, hands_ahead, reason
+from handrail.collect.cockpit.snapshot import STATUS, Snapshots, reason
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
@@ -20,6 +21,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.sources import Intents, Source
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.numerics.rotation import rotation_vector
 from handrail.datasets.recording.frames import Frame
@@ -165,6 +167,23 @@ def test_a_moment_is_small_and_finite(env, person):
     assert [len(ghost) for ghost in said["ghosts"]] == [7]
     assert len(said["paths"][0]) == len(said["track"]) > 5
     assert len(text) < 6000
+
+
+def test_drivers_are_said_beside_a_policy_alone_and_only_while_the_robot_is_driven(env, person):
+    plain, beside, moment = Snapshots(env), Snapshots(env, shared=True), frame(env)
+    moment = replace(moment, intent=Intents.of([Source("policy", moment.intent)], (0.0,), moment.intent))
+
+    def policys():
+        return beside.now(view(env), person, 0.0)["drivers"]["policy"]
+
+    for each in (plain, beside):
+        each.see(moment)
+    assert not policys()  # before Start
+    person.ask(Ask("start"))
+    assert policys() == np.flatnonzero(moment.intent.mask).tolist()
+    assert "drivers" not in plain.now(view(env), person, 0.0)
+    beside.see(replace(moment, diagnostics=Diagnostics(Status.STALE_INTENT)))
+    assert not policys()
 
 
 def test_an_undo_takes_what_came_after_the_last_rest(env, person):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from handrail.collect.cockpit import stage
-from handrail.collect.cockpit.snapshot import AHEAD, Snapshots, hands_ahead
+from handrail.collect.cockpit.ahead import AHEAD, hands_ahead
+from handrail.collect.cockpit.snapshot import Snapshots
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View

@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from fuzz_helpers import failing, run
+from fuzz_helpers import RudeOperator, RudePair, failing, run
 
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.mpc.safety_filter import safety_filter
@@ -16,14 +16,16 @@ from handrail.controllers.robot.model import load_model
 EXCESS = 1e-6  # of a limit, relative, that is rounding
 
 
-def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, failures=0.0):
+def check(
+    seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, failures=0.0, operator=RudeOperator
+):
     """Run seeds; the robot touches neither itself nor what stands, keeps its limits, and gets somewhere."""
     model, results = load_model(robot), {}
     controller = make(model)
     with single_threaded():
         for seed in seeds:
             with failing(controller, seed, failures):
-                results[seed] = run(model, controller, seed, seconds, movers)
+                results[seed] = run(model, controller, seed, seconds, movers, operator=operator)
     statuses = sum((result.statuses for result in results.values()), Counter())
     travelled = np.median([result.travelled for result in results.values()])
     assert not {seed: r.own for seed, r in results.items() if r.own}
@@ -40,6 +42,18 @@ def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, fail
 def test_rude_intents_in_clutter(make, robot):
     statuses, _ = check(range(1000, 1003), 5.0, make=make, robot=robot)
     assert {"ok", "invalid_intent", "stale_intent"} <= set(statuses)
+
+
+@pytest.mark.parametrize("robot", robot_names())
+def test_two_rude_sources_in_clutter(robot):
+    statuses, _ = check(range(1000, 1003), 5.0, robot=robot, operator=RudePair)
+    assert {"ok", "invalid_intent", "stale_intent"} <= set(statuses)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", robot_names())
+def test_two_rude_sources_in_clutter_at_length(robot):
+    check(range(200), 5.0, robot=robot, operator=RudePair)
 
 
 @pytest.mark.parametrize("movers", [1, 2])

@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 import torch
 from canned import canned, record_by_command
+from command_helpers import ran
 from lerobot.datasets.sampler import EpisodeAwareSampler
 from safetensors.torch import load_file
 from takeover_helpers import FRAMES, expected_owners, record_takeovers
 from training_helpers import cut, refused, tiny, weights
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.reading.reader import read_info
+from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.policies.imitation.interface.checkpoint import MODEL, last_checkpoint, read_meta
 from handrail.policies.imitation.training import run
 from handrail.policies.imitation.training.corrections import Draws
@@ -114,8 +118,6 @@ def test_what_is_shown_is_what_was_asked_for(kind, takeovers, corrections, tmp_p
 
 
 def test_demonstrations_that_are_merged_in_are_a_person_s_too(takeovers, tmp_path):
-    from command_helpers import ran
-
     plain = canned(record_takeovers, 1, shared=False)
     ran(plain, takeovers, "--output", tmp_path / "both", name="merge")
     found = {}
@@ -131,6 +133,22 @@ def test_without_the_column_it_is_one_line(kind, recorded, tmp_path):
     words = f"--corrections {kind}: expected a column 'intervention' in .*, found none"
     refused(tiny(recorded, tmp_path / "policy", corrections=kind), words)
     assert not (tmp_path / "policy").exists()
+
+
+def test_lerobot_s_own_take_overs_say_only_that_somebody_intervened(tmp_path):
+    """Without owners, in a dataset of any columns."""
+    vector = Feature("float32", (2,), ("a.pos", "b.pos"))
+    features = {"observation.state": vector, "action": vector, "intervention": Feature("bool")}
+    root, taken = tmp_path / "set", [False, True, True, False, False, False]
+    with EpisodeWriter.create(root, Manifest("any/body", 20, "so101", features)) as writer:
+        for index, each in enumerate(taken):
+            rows = np.full(2, index, np.float32)
+            writer.add_frame({"observation.state": rows, "action": rows, "intervention": each}, "wave")
+        writer.save_episode({})
+    for kind, expected in (("only", [1, 2]), ("weighted", [1, 1, 2, 2, 0, 3, 4, 5])):
+        config = tiny(root, tmp_path / kind, corrections=kind, actions="recorded", steps=1)
+        assert read_source(config).dataset(policy_config(config)).draws.frames().tolist() == expected
+        assert train(config, quiet=True).is_dir()
 
 
 @pytest.mark.parametrize("kind", ["only", "weighted"])

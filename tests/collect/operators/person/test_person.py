@@ -217,3 +217,24 @@ def test_an_episode_that_runs_is_paused_before_it_is_quit(operator):
     assert operator.phase is Phase.PAUSED
     operator.ask(Ask("quit"))
     assert operator.act(view()) is EpisodeEvent.QUIT
+
+
+@pytest.mark.parametrize("supervises", [False, True])
+@pytest.mark.parametrize("loss", ["late", "hidden"])
+def test_whoever_supervises_presses_start_after_a_loss(supervises, loss):
+    """A policy would drive on by itself: that all is let go is how they supervise."""
+    CLOCK[0] = 100.0
+    operator = Person(MODEL, fitting(MODES, 1), "ee", lambda: CLOCK[0], supervises)
+    operator.reset(view(), np.random.default_rng(0))
+    begin(operator)
+    if loss == "late":
+        CLOCK[0] += DEAD_MAN_TIME + 0.01
+    else:
+        drive(operator, on=False)
+    assert operator.act(view()) is EpisodeEvent.PAUSE
+    for _ in range(3):
+        drive(operator)
+        went_on = operator.act(view()) is not EpisodeEvent.PAUSE
+        assert went_on == (not supervises)
+    operator.ask(Ask("start"))
+    assert isinstance(operator.act(view()), Intent)

@@ -1,0 +1,102 @@
+"""The same twist in the usual frames: what the robot does is the same, or there is no answer."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from arbiter_helpers import ONE, TWO, channels_of
+
+from handrail.controllers.interface.channel_matrix import channel_matrix
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.usual_frames import in_usual_frames
+from handrail.controllers.objectives.objective import Stage
+from handrail.controllers.objectives.tracking import channel_velocities
+
+
+def realised(model):
+    """Return the function of q, v and the frames' parameters to the velocity of every channel."""
+    q, v, u = (ca.SX.sym(name, model.size) for name in "qvu")
+    p = ca.SX.sym("p", 5)
+    return ca.Function("c", [q, v, p], [channel_velocities(Stage(model, q, v, u), channels_of(model), p)])
+
+
+ROBOTS = {"one hand": (ONE, realised(ONE)), "two hands": (TWO, realised(TWO))}
+both = pytest.mark.parametrize("robot", ROBOTS)
+
+
+def drawn(rng, model):
+    return rng.uniform(-1.5, 1.5, model.size), rng.uniform(-1.0, 1.0, model.size)
+
+
+def whole_parts(rng, channels, point):
+    """Draw a mask that has each translation and each rotation wholly, or not at all."""
+    mask = rng.random(channels.size) < 0.5
+    mask[1] = mask[0]
+    twists = [channels.hand_slice(hand) for hand in range(len(channels.hands))]
+    for twist in [*twists, channels.pair_slice] if channels.pair else twists:
+        mask[twist.start : twist.start + 3], turns = rng.random() < 0.5, rng.random() < 0.5
+        mask[twist.start + 3 : twist.start + 6] = turns or (mask[twist.start] and bool(np.any(point)))
+    return mask
+
+
+@both
+@pytest.mark.parametrize("tool", ["world", "tool"])
+@pytest.mark.parametrize("base", ["base", "world"])
+@pytest.mark.parametrize("far", [0.0, 0.4])
+def test_the_robot_that_does_as_asked_does_the_same_in_usual_frames(robot, base, tool, far):
+    (model, function), rng = ROBOTS[robot], np.random.default_rng(5)
+    channels = channels_of(model)
+    for _ in range(10):
+        q, v = drawn(rng, model)
+        frames = Frames(base, tool, far * rng.uniform(-1, 1, 3))
+        mask = whole_parts(rng, channels, frames.point)
+        meant = np.array(function(q, v, frames.parameters)).ravel()
+        asked = Intent(np.where(mask, meant, np.nan), mask, frames=frames)
+        usual = in_usual_frames(asked, model, q)
+        assert usual is not None
+        assert usual.frames.parameters.tolist() == Frames().parameters.tolist()
+        assert np.array_equal(usual.mask, mask)
+        expected = channel_matrix(model, channels, q) @ v
+        assert np.allclose(usual.values[mask], expected[mask], atol=1e-8)
+
+
+@both
+def test_the_matrix_is_that_of_the_objective(robot):
+    (model, function), rng = ROBOTS[robot], np.random.default_rng(6)
+    for _ in range(10):
+        q, v = drawn(rng, model)
+        expected = np.array(function(q, v, Frames().parameters)).ravel()
+        assert np.allclose(channel_matrix(model, channels_of(model), q) @ v, expected, atol=1e-6)
+
+
+@both
+@pytest.mark.parametrize(
+    ("frames", "lacks"),
+    [
+        (Frames(tool="tool"), [".vx"]),
+        (Frames(tool="tool"), [".wx", ".wy"]),
+        (Frames(base="world"), ["base.vy"]),
+        (Frames(point=np.array([0.1, 0.0, 0.0])), [".wx", ".wy", ".wz"]),
+    ],
+)
+def test_what_only_its_own_frame_can_say_has_no_answer(robot, frames, lacks):
+    model = ROBOTS[robot][0]
+    channels = channels_of(model)
+    hand = channels.hands[-1][0].split(".")[0]
+    missing = [name if name.startswith("base") else hand + name for name in lacks]
+    mask = channels.mask("base", hand) & ~channels.mask(*missing)
+    assert (
+        in_usual_frames(Intent(np.zeros(channels.size), mask, frames=frames), model, np.ones(model.size))
+        is None
+    )
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        Intent(np.zeros(3), np.ones(3, bool), frames=Frames(tool="tool")),
+        Intent(np.zeros(channels_of(ONE).size), np.ones(channels_of(ONE).size, bool), frames=Frames("moon")),
+    ],
+)
+def test_what_no_controller_accepts_stays(asked):
+    assert in_usual_frames(asked, ONE, ONE.description.home) is asked
