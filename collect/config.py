@@ -15,15 +15,14 @@ from handrail.collect.flags import check_file, check_names, names, one_of, only_
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.shared.catalogue import ARBITERS
-from handrail.collect.operators.shared.settings import ArbiterSettings
+from handrail.collect.policy_config import PolicyConfig
 from handrail.collect.teleop_config import TeleopConfig
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.typed import AtLeastOne, Count, check, check_settings
 from handrail.datasets.advanced import Advanced
-from handrail.datasets.lists import Names, Words
+from handrail.datasets.lists import Names
 
 _Side = Annotated[int, Meta(ge=16, le=1024, multiple_of=2)]
 REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
@@ -188,7 +187,7 @@ class FoundDatasetConfig(DatasetConfig):
 
 
 @dataclass(frozen=True)
-class RecordConfig(SessionConfig, ExecutionConfig):
+class RecordConfig(SessionConfig, PolicyConfig, ExecutionConfig):
     """Record demonstrations of a robot steered through the masked MPC as a LeRobot dataset."""
 
     workers: int = field(default=0, kw_only=True)
@@ -202,11 +201,6 @@ class RecordConfig(SessionConfig, ExecutionConfig):
     """Remove the dataset that is there, if Handrail recorded it."""
     cockpit: Advanced[CockpitConfig] = field(default_factory=CockpitConfig)
     teleop: Advanced[TeleopConfig] = field(default_factory=TeleopConfig)
-    policy: Advanced[Words] = ()
-    """Let a trained policy drive while the operator supervises it: its folder; several are an ensemble."""
-    arbiter: Advanced[Annotated[str, one_of(ARBITERS)]] = "by_mask"
-    """With --policy: who owns what when the operator takes over."""
-    arbitration: Advanced[ArbiterSettings] = field(default_factory=ArbiterSettings)
     robot_client: Advanced[str] = ""
     """Drive this robot of LeRobot's through its client instead of a simulation: lekiwi."""
     client: Advanced[ClientConfig] = field(default_factory=ClientConfig)
@@ -227,10 +221,7 @@ class RecordConfig(SessionConfig, ExecutionConfig):
         if self.robot_client and (self.moving_obstacles or self.randomise or not self.physics):
             words = "expected none of --moving_obstacles, --randomise, --no_physics"
             raise HandrailError(f"--robot_client {self.robot_client}: {words}")
-        ARBITERS.check(self.arbiter)
-        if self.operator in ("supervisor", "hand_supervisor") and not self.policy:
-            words = "expected --policy, the folder of one to supervise"
-            raise HandrailError(f"--operator {self.operator}: {words}")
+        self.check_policy(self.operator)
         self._check_rates()
         self._check_sharing()
         for one, other in (("resume", "overwrite"), ("display_data", "display_web")):

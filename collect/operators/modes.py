@@ -103,16 +103,6 @@ MODES = Registry(
             "dls",
             "steer the hand; base and arm follow by damped least squares: ee without the MPC",
         ),
-        TeleopMode(
-            "ee_filtered", always("hand"), "filter", "steer the hand, through the multi-step safety filter"
-        ),
-        TeleopMode("ee_cbf", always("hand"), "cbf", "steer the hand, through a one-step CBF safety filter"),
-        TeleopMode(
-            "blended",
-            always("hand"),
-            "blended",
-            "steer the hand; an actor that knows the goal weighs as much, while you move",
-        ),
         TeleopMode("base", always("base"), "mpc", "steer the base; the arm keeps clear by itself"),
         TeleopMode("base+ee", always("base", "hand"), "mpc", "steer base and hand at once"),
         TeleopMode("joints", always("joint"), "mpc", "steer every joint, kept safe by the MPC"),
@@ -163,6 +153,16 @@ MODES = Registry(
             "mpc",
             "steer the hand and the joints that carry all arms",
             hands=2,
+        ),
+        TeleopMode(
+            "ee_filtered", always("hand"), "filter", "steer the hand, through the multi-step safety filter"
+        ),
+        TeleopMode("ee_cbf", always("hand"), "cbf", "steer the hand, through a one-step CBF safety filter"),
+        TeleopMode(
+            "blended",
+            always("hand"),
+            "blended",
+            "steer the hand; an actor that knows the goal weighs as much, while you move",
         ),
     ),
 )

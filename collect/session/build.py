@@ -19,7 +19,7 @@ from handrail.collect.world.looks import Looks
 from handrail.collect.world.plant import Plant
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Task
-from handrail.collect.world.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS, check_robot
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
@@ -54,7 +54,7 @@ def build_env(
     config.check()
     check_fps(fps)
     task, model = build_task(config), load_model(config.robot)
-    model.description.check_hands(f"task {config.task}", TASKS.find(config.task).hands)
+    check_robot(config.task, model.description)
     return HandrailEnv(
         task,
         model.with_hand(config.hand),

@@ -47,6 +47,11 @@ class _Aside:
         with explained("cannot read the pictures of an episode"):
             self.file.seek(frame.number * sum(sizes.values()))
             read = {name: np.frombuffer(self.file.read(size), np.uint8) for name, size in sizes.items()}
+            for name, size in sizes.items():
+                if len(read[name]) < size:
+                    raise OSError(
+                        f"frame {frame.number}: expected {name}, got {len(read[name])} of {size} bytes"
+                    )
         images = {name: read[name].reshape(shape) for name, shape in self._shapes.items()}
         return replace(frame, images=images)
 

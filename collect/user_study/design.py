@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.world.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS, check_robot
 from handrail.controllers.errors import HandrailError, shown, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description
@@ -128,11 +128,10 @@ class UserStudy:
                 if name not in choices:
                     raise unknown_name(thing, name, choices)
         description = load_description(self.robot)
-        for name, spec in (
-            *((f"mode {name}", MODES[name]) for name in self.modes),
-            *((f"task {name}", TASKS[name]) for name in self.tasks),
-        ):
-            description.check_hands(name, spec.hands)
+        for mode in self.modes:
+            description.check_hands(f"mode {mode}", MODES[mode].hands)
+        for task in self.tasks:
+            check_robot(task, description)
         if not (self.modes and self.tasks):
             raise HandrailError("modes and tasks: expected one or more of each, got none")
         if {"tlx", "tlx_raw"} <= set(self.forms):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from handrail.collect.world.scene import FrozenArrays, Scene, SceneObject
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import unknown_name
 from handrail.controllers.robot.inverse_kinematics import hands_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -219,12 +219,3 @@ def hand_rotation(x: ArrayLike, z: ArrayLike) -> FloatArray:
 def nearest_rotation(tool: FloatArray, rotations: Iterable[FloatArray]) -> FloatArray:
     """Return the one of some rotations that is nearest to the tool's, (3, 3)."""
     return max(rotations, key=lambda rotation: float(np.trace(rotation.T @ tool)))
-
-
-def check_large(model: RobotModel, task: str) -> None:
-    """Check that a robot is as large as a task's furniture, which comes in one size."""
-    if model.description.world.scale < 1.0:
-        raise HandrailError(
-            f"task {task}: expected a robot whose world has scale 1, got {model.description.name} "
-            f"with {model.description.world.scale}; it can do reach and pick_place"
-        )

@@ -15,7 +15,7 @@ _ROUNDING = 1e-9  # of a time [s]
 
 
 @dataclass(frozen=True)
-class Source:
+class IntentSource:
     """One that asks: a person, a policy, a script."""
 
     name: str  # which one; what the controller's Ψ heard of it is remembered by it
@@ -33,12 +33,12 @@ class Source:
 class Term(NamedTuple):
     """A source that has some weight, and its part of all weight on each channel, (m,)."""
 
-    source: Source
+    source: IntentSource
     part: FloatArray
     alone: BoolArray | None  # where it has a part, if that is all of the weight everywhere, (m,)
 
     @classmethod
-    def of(cls, source: Source, share: FloatArray, total: FloatArray) -> "Term":
+    def of(cls, source: IntentSource, share: FloatArray, total: FloatArray) -> "Term":
         """Return the term of a source with its share of a total, (m,) each."""
         part = np.divide(share, total, out=np.zeros_like(total), where=total > 0.0)
         owned = part > 0.0
@@ -66,14 +66,14 @@ class Intents(Intent):
     a source that owns a channel and is stale brakes the robot. Make it with `Intents.of`.
     """
 
-    sources: tuple[Source, ...] = ()
+    sources: tuple[IntentSource, ...] = ()
     terms: tuple[Term, ...] = ()  # of the sources that count
     share: FloatArray | None = None  # W, (m,); None where it is 1 wherever the mask is true
     last: float = 0.0  # when the last of those that count asked [s]
     of_grippers: tuple[str, ...] = ()  # name of the source that owns each gripper
 
     @classmethod
-    def of(cls, sources: Sequence[Source], grippers: tuple[float, ...], base: Intent) -> "Intents":
+    def of(cls, sources: Sequence[IntentSource], grippers: tuple[float, ...], base: Intent) -> "Intents":
         """Return the intents of sources as one; those that own nothing are left out of the sum.
 
         Sources of another size, in other frames, or with a weight that is no number make an intent that no
@@ -115,12 +115,12 @@ class Intents(Intent):
         """When the last of those that count asked [s]."""
         return self.last
 
-    def source(self, name: str) -> Source | None:
+    def source(self, name: str) -> IntentSource | None:
         """Return a source by its name, if it is there."""
         return next((source for source in self.sources if source.name == name), None)
 
 
-def _fits(source: Source, base: Intent) -> bool:
+def _fits(source: IntentSource, base: Intent) -> bool:
     """Whether a source can be in a sum with others: sizes, frames, a weight that is a number, values."""
     intent, weight = source.intent, np.asarray(source.weight)
     sizes = intent.values.shape == base.values.shape and weight.shape in ((), base.values.shape)

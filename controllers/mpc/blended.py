@@ -8,7 +8,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.sources import Intents, Source
+from handrail.controllers.interface.sources import Intents, IntentSource
 from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.rotation import rotation_vector
@@ -58,8 +58,8 @@ class BlendedMpc(MaskedMpc):
         mask[hand], values[hand] = intent.mask[hand], self._wanted(self._goal, state.q)
         actor = replace(operator, values=values, mask=mask)
         sources = (
-            Source("operator", operator, np.where(mask, 1.0 - SHARE, 1.0)),
-            Source("actor", actor, SHARE),
+            IntentSource("operator", operator, np.where(mask, 1.0 - SHARE, 1.0)),
+            IntentSource("actor", actor, SHARE),
         )
         return Intents.of(sources, intent.grippers, operator)
 

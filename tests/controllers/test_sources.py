@@ -13,7 +13,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Bounded, Extrapolated, Smoothed, constant
-from handrail.controllers.interface.sources import Intents, Preview, Source
+from handrail.controllers.interface.sources import Intents, IntentSource, Preview
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.tracking import tracking
 from handrail.controllers.robot.model import load_model
@@ -45,7 +45,7 @@ def test_one_source_is_bit_for_bit_the_intent(predict):
     for step in range(1, 201):
         state = State(q, v, step * PERIOD, commanded)
         one, same = (each.intent(state.time) for each in rude)
-        together = Intents.of([Source("person", same)], same.grippers, same)
+        together = Intents.of([IntentSource("person", same)], same.grippers, same)
         first, second = alone.update(state, one), wrapped.update(state, together)
         assert np.array_equal(first.velocities, second.velocities)
         assert first.diagnostics.status == second.diagnostics.status
@@ -59,7 +59,9 @@ def test_disjoint_masks_are_their_union(seed):
     whole = drawn(rng, 0.7)
     part = rng.random(SIZE) < 0.5
     one, other = (replace(whole, mask=whole.mask & mine) for mine in (part, ~part))
-    found = MaskedMpc(MODEL).update(REST, together(Source("a", one), Source("b", other), base=whole))
+    found = MaskedMpc(MODEL).update(
+        REST, together(IntentSource("a", one), IntentSource("b", other), base=whole)
+    )
     assert np.array_equal(found.velocities, MaskedMpc(MODEL).update(REST, whole).velocities)
 
 
@@ -67,7 +69,7 @@ def test_disjoint_masks_are_their_union(seed):
 def test_the_terms_add_up(seed):
     """The one term of the problem is the sum of the sources' terms, but for a constant."""
     rng = np.random.default_rng(seed)
-    sources = [Source(name, drawn(rng), rng.uniform(0.0, 2.0, SIZE)) for name in "abc"]
+    sources = [IntentSource(name, drawn(rng), rng.uniform(0.0, 2.0, SIZE)) for name in "abc"]
     problem = MaskedMpc(MODEL).build_problem(REST, together(*sources))
     unit = MaskedMpc(MODEL).build_problem(REST, replace(drawn(rng), mask=np.ones(SIZE, bool))).weights
 
@@ -96,7 +98,7 @@ def test_equal_channels_are_the_weighted_mean(share):
     for step in range(1, 41):
         time = step * PERIOD
         pair = zip("ab", padded, (1.0 - share, share), strict=True)
-        sources = [Source(name, intent(each, "base", time=time), weight) for name, each, weight in pair]
+        sources = [IntentSource(name, intent(each, "base", time=time), weight) for name, each, weight in pair]
         state = State(q, commanded, time, commanded)
         command = controller.update(state, together(*sources))
         assert command.diagnostics.status is Status.OK
@@ -109,8 +111,8 @@ def test_equal_channels_are_the_weighted_mean(share):
 
 def test_a_source_without_weight_changes_nothing_even_if_it_is_stale():
     ask = intent(np.full(SIZE, 0.2), "ee")
-    silent = Source("policy", intent(np.full(SIZE, -0.4), "ee", time=-9.0), 0.0)
-    found = MaskedMpc(MODEL).update(REST, together(Source("person", ask), silent))
+    silent = IntentSource("policy", intent(np.full(SIZE, -0.4), "ee", time=-9.0), 0.0)
+    found = MaskedMpc(MODEL).update(REST, together(IntentSource("person", ask), silent))
     assert np.array_equal(found.velocities, MaskedMpc(MODEL).update(REST, ask).velocities)
 
 
@@ -118,9 +120,9 @@ def test_what_a_source_does_not_own_means_nothing():
     """An infinite value under the mask, a source of another size that owns nothing."""
     one, other = intent(np.full(SIZE, 0.2), "ee"), intent(np.full(SIZE, 0.1), "ee", "base")
     wild = replace(one, values=np.where(one.mask, one.values, np.inf))
-    nothing = Source("c", Intent(np.ones(3), np.zeros(3, bool), time=0.05), np.ones(SIZE))
-    clean = together(Source("a", one), Source("b", other))
-    found = together(Source("a", wild), Source("b", other), nothing)
+    nothing = IntentSource("c", Intent(np.ones(3), np.zeros(3, bool), time=0.05), np.ones(SIZE))
+    clean = together(IntentSource("a", one), IntentSource("b", other))
+    found = together(IntentSource("a", wild), IntentSource("b", other), nothing)
     assert np.array_equal(found.values, clean.values)
     commands = [MaskedMpc(MODEL).update(REST, each) for each in (found, clean)]
     assert commands[0].diagnostics.status is Status.OK
@@ -132,8 +134,8 @@ def test_each_source_has_its_own_prediction():
     person = intent(np.full(SIZE, 0.1), "base")
     rows = np.linspace(0.0, 0.4, 5)[:, None] * np.ones(SIZE)
     plan = Preview(rows, 0.05 + 0.25 * np.arange(5))
-    policy = Source("policy", intent(rows[0], "ee"), predict=plan)
-    problem = MaskedMpc(MODEL).build_problem(REST, together(Source("person", person), policy))
+    policy = IntentSource("policy", intent(rows[0], "ee"), predict=plan)
+    problem = MaskedMpc(MODEL).build_problem(REST, together(IntentSource("person", person), policy))
     hand, stages = CHANNELS.hand_slice(), 0.05 + 0.1 * np.arange(1, 11)
     expected = [rows[np.flatnonzero(plan.times <= time + 1e-9)[-1], 0] for time in stages]
     assert np.allclose(problem.reference[:, hand], np.array(expected)[:, None])
@@ -143,7 +145,9 @@ def test_each_source_has_its_own_prediction():
 def test_a_huge_source_is_cut_before_it_is_weighed():
     """A policy that asks for 10⁶ m/s does not shout a person down."""
     person, policy = intent(np.full(SIZE, -0.2), "ee"), intent(np.full(SIZE, 1e6), "ee")
-    problem = MaskedMpc(MODEL).build_problem(REST, together(Source("a", person), Source("b", policy)))
+    problem = MaskedMpc(MODEL).build_problem(
+        REST, together(IntentSource("a", person), IntentSource("b", policy))
+    )
     assert np.allclose(problem.reference[0, CHANNELS.hand_slice()][:3], 0.5 * (-0.2 + 2.0))
 
 
@@ -166,7 +170,7 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_one_bad_source_brakes_the_robot(name, first):
     ask, weight, status = BAD[name]
-    sources = [Source("policy", ask, weight), Source("person", FINE)]
+    sources = [IntentSource("policy", ask, weight), IntentSource("person", FINE)]
     intents = Intents.of(sources if first else sources[::-1], (0.0,), FINE)
     found = MaskedMpc(MODEL).update(REST, intents).diagnostics.status
     assert found is status
@@ -180,7 +184,9 @@ def test_a_source_that_dies_brakes_within_the_dead_man_time():
         person = intent(ask, "base", time=time)
         policy = intent(np.zeros(SIZE), "ee", time=min(time, 1.0))
         state = State(q, commanded, time, commanded)
-        command = controller.update(state, together(Source("person", person), Source("policy", policy)))
+        command = controller.update(
+            state, together(IntentSource("person", person), IntentSource("policy", policy))
+        )
         if command.diagnostics.status.brakes and braked is None:
             braked = time
         commanded = command.velocity(PERIOD)
@@ -196,7 +202,7 @@ def test_two_hands_can_have_an_owner_each():
     values, state = np.full(channels.size, 0.1), State(model.description.home, np.zeros(model.size), 0.05)
     one, other, both = (Intent(values, channels.mask(*g), time=0.05) for g in (["left"], ["right"], ["ee"]))
     found = MaskedMpc(model).update(
-        state, Intents.of([Source("person", one), Source("policy", other)], (0.0, 0.0), one)
+        state, Intents.of([IntentSource("person", one), IntentSource("policy", other)], (0.0, 0.0), one)
     )
     assert np.array_equal(found.velocities, MaskedMpc(model).update(state, both).velocities)
 

@@ -20,7 +20,7 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.sources import Intents, Source
+from handrail.controllers.interface.sources import Intents, IntentSource
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.robot.model import RobotModel
@@ -169,7 +169,7 @@ class RudePair:
         second = replace(second, time=min(second.time, time - self._late) if self._late else second.time)
         weights = self._weights if rng.random() < 0.99 else [rng.choice([np.nan, -1.0, np.inf]), 1.0]
         sources = [
-            Source(name, each, weight)
+            IntentSource(name, each, weight)
             for name, each, weight in zip(("person", "policy"), (first, second), weights, strict=True)
         ]
         return Intents.of(sources, first.grippers, first)

@@ -42,7 +42,9 @@ def test_commands_parse(words):
 
 def test_lerobot_s_own_parser_takes_the_training_commands():
     recorded_by_lerobot = {
-        word for word in chain(*commands("lerobot-record")) if word.startswith("--dataset.root=")
+        word
+        for word in chain(*commands("lerobot-record"), *commands("lerobot-rollout"))
+        if word.startswith("--dataset.root=")
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -106,7 +108,7 @@ def flags(config: type, prefix: str = "") -> set[str]:
     names = set()
     for entry in fields(config):
         nested = entry.default_factory if is_dataclass(entry.default_factory) else None
-        if nested and entry.name in ("human", "cockpit", "teleop", "client"):
+        if nested and entry.name in ("human", "cockpit", "teleop", "client", "arbitration"):
             names.add(f"--{entry.name}.*")
         elif nested:
             names |= flags(nested, f"{prefix}{entry.name}.")

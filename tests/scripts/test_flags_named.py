@@ -11,6 +11,7 @@ from lerobot.configs.dataset import DatasetRecordConfig
 from lerobot.configs.default import EvalConfig
 from lerobot.envs.configs import EnvConfig
 from lerobot.robots import RobotConfig
+from lerobot.rollout.configs import DAggerStrategyConfig
 from lerobot.teleoperators import TeleoperatorConfig
 from pages import CONFIGS, PAGES, text
 from places import FLOORS, ROOT, sources
@@ -20,6 +21,8 @@ import handrail.collect.lerobot.plugins  # noqa: F401
 FLAG = re.compile(r"(?<![\w(-])--[a-z][\w.]*(?:-[a-z]\w*)*")
 STYLE = ("var(--", 'style="')  # of a page: what begins with "--" there is a colour
 OTHERS = {  # flags of other programs, by the word that the same text must say
+    "--strategy.": "--strategy.type --strategy.smooth_handover --strategy.record_autonomous "
+    "--strategy.keyboard.pause_resume --strategy.keyboard.correction",
     "lerobot-dataset-viz": "--repo-id --root --episode-index --save --output-dir",
     "lerobot-edit-dataset": "--repo_id --root --new_root --operation.type --operation.episode_indices",
     "lerobot.robots.lekiwi.lekiwi_host": "--host.connection_time_s",
@@ -48,6 +51,7 @@ def known() -> set[str]:
         chosen = [each for name, each in kind.get_known_choices().items() if name.startswith("handrail")]
         found |= {f"--{part}.{entry.name}" for each in chosen for entry in fields(each)}
     found |= {f"--dataset.{entry.name}" for entry in fields(DatasetRecordConfig)}
+    found |= {"--strategy.type", *(f"--strategy.{entry.name}" for entry in fields(DAggerStrategyConfig))}
     return found | {f"--eval.{entry.name}" for entry in fields(EvalConfig)}
 
 

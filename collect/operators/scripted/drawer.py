@@ -1,5 +1,7 @@
 """How an operator pulls a drawer open."""
 
+from functools import partial
+
 import numpy as np
 
 from handrail.collect.operators.operator import View
@@ -8,11 +10,11 @@ from handrail.collect.operators.scripted.placement import standing_within_reach
 from handrail.collect.world.tasks.drawer import handle, handle_rotation, inward, opened
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_rpy
-from handrail.controllers.robot.model import Pose
+from handrail.controllers.robot.model import Pose, RobotModel
 
 _PULL = 0.26  # how far the operator means to open it [m]
 _ENOUGH = 0.21  # [m]
-_BACK = 0.16  # hand before the handle at the beginning and at the end [m]
+BACK = 0.16  # hand before the handle at the beginning and at the end [m]
 _AWAY = 0.10  # from it that is far enough to leave it alone [m]
 
 
@@ -33,23 +35,19 @@ class DrawerScript(PhasedScript):
         rotation = handle_rotation(view.tool.rotation, into)
         base = view.state.q[:3] if self._model.description.base.joints else np.zeros(3)
         options = {"distance": 0.03, "angle": 3.2, "pace": 0.5, "patience": 5.0}
-        return [ScriptPhase.at("leave", bar - _BACK * into, rotation, base, **options)]
+        return [ScriptPhase.at("leave", bar - BACK * into, rotation, base, **options)]
 
     def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the handle, how to pull it, and how to let go."""
-        into = inward(view.task.object("cabinet").rotation)
-        bar, grasp = handle(view.task), handle_rotation(view.tool.rotation, into)
+        way = way_to_handle(self._model, view, handle(view.task), 0.02)
+        into, bar, base = inward(view.task.object("cabinet").rotation), way[-1].hand, way[-1].base
         pull = max(_PULL - opened(view.task), 0.05)
-        yaw = float(np.arctan2(into[1], into[0]))
-        base = standing_within_reach(self._model, view.state.q, Pose(bar, grasp), yaw)
         back = base - np.array([pull * into[0], pull * into[1], 0.0])
-        before, pulled, at = bar - _BACK * into, bar - pull * into, ScriptPhase.at
+        at = partial(ScriptPhase.at, position=bar.position - pull * into, rotation=bar.rotation, base=back)
         phases = [
-            at("stage", before, grasp, base, distance=0.02, angle=0.10),
-            at("approach", bar, grasp, base, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
-            at("grasp", bar, grasp, base, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
-            at("pull", pulled, grasp, back, distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
-            at("release", pulled, grasp, back, distance=1.0, angle=3.2, dwell=0.8),
+            *way,
+            at("pull", distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
+            at("release", distance=1.0, angle=3.2, dwell=0.8),
         ]
         if not self._drives:
             return phases
@@ -57,6 +55,19 @@ class DrawerScript(PhasedScript):
         ready = ScriptPhase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
         drive = ScriptPhase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08)
         return [ready, drive, *phases]
+
+
+def way_to_handle(model: RobotModel, view: View, bar: FloatArray, near: float) -> list[ScriptPhase]:
+    """Return how the hand gets before a place of the handle, (3,), so near [m], then there, and grasps."""
+    into = inward(view.task.object("cabinet").rotation)
+    grasp, yaw = handle_rotation(view.tool.rotation, into), float(np.arctan2(into[1], into[0]))
+    base = standing_within_reach(model, view.state.q, Pose(bar, grasp), yaw)
+    at = partial(ScriptPhase.at, rotation=grasp, base=base)
+    return [
+        at("stage", bar - BACK * into, distance=near, angle=0.10),
+        at("approach", bar, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+        at("grasp", bar, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+    ]
 
 
 def before_driving(hand: Pose, base: FloatArray, now: FloatArray) -> Pose:

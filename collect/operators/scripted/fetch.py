@@ -6,15 +6,13 @@ from functools import partial
 import numpy as np
 
 from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripted.drawer import BACK, way_to_handle
 from handrail.collect.operators.scripted.phases import ScriptPhase, from_phase, turns
 from handrail.collect.operators.scripted.pick_place import PickPlaceScript
-from handrail.collect.operators.scripted.placement import standing_within_reach
-from handrail.collect.world.tasks.drawer import handle, handle_rotation, inward, opened
+from handrail.collect.world.tasks.drawer import handle, inward, opened
 from handrail.collect.world.tasks.pick_place import grasp_rotation
-from handrail.controllers.robot.model import Pose
 
 _PULL, _ENOUGH = 0.38, 0.28  # how far the operator means to open it, and has to [m]
-_BACK = 0.16  # hand before the handle at the beginning and at the end [m]
 _ASIDE = 0.04  # hand beside the handle's middle [m]
 _APART = 0.4  # of the hands while they are steered as a pair [m]
 _CLEAR = np.array([0.0, 0.0, 0.30])  # above the cube [m]
@@ -38,19 +36,11 @@ class FetchScript(PickPlaceScript):
         across = tool.position - view.task.tools[1 - view.task.hand].position
         aside = np.array([-into[1], into[0], 0.0]) * np.sign(into[0] * across[1] - into[1] * across[0])
         bar = handle(view.task) + opened(view.task) * into + _ASIDE * aside  # it closes again
-        grasp = handle_rotation(tool.rotation, into)
-        yaw = float(np.arctan2(into[1], into[0]))
-        base = standing_within_reach(self._model, view.state.q, Pose(bar, grasp), yaw)
-        before, pulled, beside = bar - _BACK * into, bar - _PULL * into, 0.5 * _APART * aside
-        at = partial(ScriptPhase.at, rotation=grasp, base=base)
-        pull = at("pull", pulled - beside, apart=_APART, distance=0.03, angle=3.2, pace=0.5, dwell=0.8)
-        own = [
-            at("before", before, distance=0.015, angle=0.10),
-            at("approach", bar, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
-            at("grasp", bar, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
-        ]
-        stage = at("stage", before - beside, apart=_APART, distance=0.03, angle=0.10)
-        return [stage, *turns(False, 0.0, own), replace(pull, gripper=1.0, other=0.0)]
+        way, beside = way_to_handle(self._model, view, bar, 0.015), 0.5 * _APART * aside
+        at = partial(ScriptPhase.at, rotation=way[0].hand.rotation, base=way[0].base, apart=_APART)
+        stage = at("stage", bar - BACK * into - beside, distance=0.03, angle=0.10)
+        pull = at("pull", bar - _PULL * into - beside, distance=0.03, angle=3.2, pace=0.5, dwell=0.8)
+        return [stage, *turns(False, 0.0, way), replace(pull, gripper=1.0, other=0.0)]
 
     def _take(self, view: View) -> list[ScriptPhase]:
         """Return how the other hand takes the cube out, and the first one lets go."""
@@ -66,5 +56,5 @@ class FetchScript(PickPlaceScript):
         into = inward(task.object("cabinet").rotation)
         free = partial(ScriptPhase.at, rotation=tool.rotation, base=base, angle=3.2)
         release = free("release", tool.position, distance=1.0, dwell=0.8)
-        leave = free("leave", tool.position - _BACK * into, distance=0.03, pace=0.5)
+        leave = free("leave", tool.position - BACK * into, distance=0.03, pace=0.5)
         return [*turns(True, 1.0, [rise, above, descend, grasp, out]), *turns(False, 1.0, [release, leave])]

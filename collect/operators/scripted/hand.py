@@ -55,18 +55,23 @@ class Perception:
         self._share = settings.misjudgement
         self._wander = Wander((9,), settings.correlation, rng)
 
-    def see(self, goal: MotionGoal, tool: Pose, time: float) -> MotionGoal:
-        """Return the goal as it comes out of what is seen at a time [s]."""
+    def see(self, goal: MotionGoal, tool: Pose, time: float, other: Pose | None = None) -> MotionGoal:
+        """Return the goal as it comes out of what is seen at a time [s]; `other`: the second hand's tool."""
         off = self._share * self._wander.at(time)
         if not self._share:
             return goal
         hand, base, target = off[:6], off[6:], goal.target
         if target is not None:
-            way = _off(hand_errors(tool, target.hand), hand, 3)
-            seen = Pose(tool.position + way[:3], matrix_from_vector(way[3:]) @ tool.rotation)
-            target = replace(target, hand=seen, meant=target.hand)
+            also = _seen(other, target.also, hand) if other and target.also else None
+            target = replace(target, hand=_seen(tool, target.hand, hand), also=also, meant=target.hand)
         hand, base = _off(goal.hand, hand, 3), _off(goal.base, base, 2)
         return replace(goal, hand=hand, base=base, target=target)
+
+
+def _seen(tool: Pose, goal: Pose, share: FloatArray) -> Pose:
+    """Return where a goal of a tool is as it is misjudged by a share of the way there, (6,)."""
+    way = _off(hand_errors(tool, goal), share, 3)
+    return Pose(tool.position + way[:3], matrix_from_vector(way[3:]) @ tool.rotation)
 
 
 def _off(vector: FloatArray, share: FloatArray, lengths: int) -> FloatArray:

@@ -169,6 +169,9 @@ class StickMap(InputMap):
             pairs = zip(tools, target.of_hands(tools), strict=True)
             return dict(enumerate(hand_twist(tool, place, self._gains, target.pace) for tool, place in pairs))
         going = self._model.number
+        if target is not None and target.also is not None:
+            tool = self._model.pose(q, self._model.description.hands[1 - going].named("tool"))
+            return {going: goal.hand, 1 - going: hand_twist(tool, target.also, self._gains, target.pace)}
         if target is not None and target.second is not None:
             return {going ^ target.second: goal.hand, 1 - (going ^ target.second): np.zeros(6)}
         return {going: goal.hand}

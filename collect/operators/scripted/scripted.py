@@ -14,6 +14,7 @@ from handrail.collect.operators.scripted.single_axis import SingleAxisMap
 from handrail.collect.operators.scripted.steering import Gains, MotionGoal, Target
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.arrays import BoolArray
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.registry import Registry, resolved
 from handrail.controllers.robot.model import RobotModel
@@ -104,7 +105,7 @@ class ScriptedOperator:
         goal = self._script.motion_goal(view)
         self.target = goal.target
         tool = goal.target.steered(view.task) if goal.target else view.tool
-        goal = self._perception.see(goal, tool, time)
+        goal = self._perception.see(goal, tool, time, view.task.tools[-1 - view.task.hand])
         mask, wanted = self._map.wanted(goal, view.state)
         self._switch(mask, time)
         moved = self._hand.move(np.zeros_like(wanted) if time < self.free_at else wanted, time)
@@ -127,6 +128,11 @@ def scripted_operator(
     model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
 ) -> ScriptedOperator:
     """Return who does a task's script in a mode, as brisk as people are with its device."""
+    if task.refuses(mode.groups("hand")):
+        raise HandrailError(
+            f"mode {mode.name}: expected each hand steered by itself, as in mode both, for task {task.name}; "
+            f"got both hands as one"
+        )
     gains = gains_of(model, mode, human)
     drives = DEVICES.find(mode.device).drives or mode.by_focus
     script = resolved(task.script)(model, gains, drives=drives)

@@ -34,6 +34,8 @@ class Target:
     second: bool | None = None
     """Of two hands that take turns: whether it is where the hand goes that does not begin the task; the other
     one holds still. None: the other one is not minded."""
+    also: Pose | None = None
+    """Where the other of two hands goes at the same time; None: nowhere."""
     meant: Pose | None = None
     """The pose itself where `hand` is as somebody sees it, who misjudges; None where it is the same."""
 

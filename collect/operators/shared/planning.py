@@ -37,7 +37,7 @@ class Planner(Protocol):
         ...
 
 
-class Beside:
+class ThreadedPlanner:
     """Plans in a thread of its own, so that no inference delays the loop; what is sent goes by time.
 
     A plan begins at the moment that it was made for; what of it lies in the past is left out. After its last

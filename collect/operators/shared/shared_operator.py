@@ -22,7 +22,7 @@ from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import LONG_AGO, Intent
-from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Preview, Source
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents, IntentSource, Preview
 from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.robot.model import RobotModel
 
@@ -109,12 +109,12 @@ class SharedOperator:
         self._held = held
         drives = policy is not None and bool(np.any(policy.mask & free))
         mine = [own or not drives for own in self._take_grippers(person, owned, time)]
-        sources = [Source(PERSON, person, shares.person)]
+        sources = [IntentSource(PERSON, person, shares.person)]
         if policy is not None:
             wanted = zip(self._closed, policy.grippers, mine, strict=True)
             self._closed = [now if own else then for now, then, own in wanted]
             policy = replace(policy, mode=person.mode)
-            sources.append(Source(POLICY, policy, shares.policy, self._ahead(policy)))
+            sources.append(IntentSource(POLICY, policy, shares.policy, self._ahead(policy)))
         intents = Intents.of(sources, tuple(self._closed), person)
         fresh = min(intents.time, person.time) if intents.mask.any() else LONG_AGO
         return replace(intents, time=fresh, of_grippers=tuple(PERSON if own else POLICY for own in mine))

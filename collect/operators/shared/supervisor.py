@@ -26,7 +26,7 @@ class Vigilance:
     turn: float = 0.3  # what weighs as much as a radian [m]
 
 
-class Supervisor:
+class PolicySupervisor:
     """Knows what is to be done next; helps when the hand comes no nearer to it; an operator.
 
     With e the distance to the script's next target, it helps a moment after e has not fallen by `progress`
@@ -79,13 +79,15 @@ class Supervisor:
         return float(distance + self._scale * self._vigilance.turn * angle)
 
 
-def supervisor(model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings) -> Supervisor:
+def supervisor(model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings) -> PolicySupervisor:
     """Return who supervises a policy that does a task, and helps in a mode."""
     helper = scripted_operator(model, mode, task, human)
-    return Supervisor(helper, Vigilance(), model.description.world.scale)
+    return PolicySupervisor(helper, Vigilance(), model.description.world.scale)
 
 
-def hand_supervisor(model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings) -> Supervisor:
+def hand_supervisor(
+    model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
+) -> PolicySupervisor:
     """Return who supervises as `supervisor`, but leaves the base to the policy whatever the mode owns."""
 
     def groups(focus: Focus) -> tuple[str, ...]:

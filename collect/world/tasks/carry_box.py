@@ -7,6 +7,7 @@ import numpy as np
 from handrail.collect.world.observation import names_of, pose_names, pose_numbers
 from handrail.collect.world.scene import Scene, Viewpoint
 from handrail.collect.world.task import Aim, Start, Task, TaskState, Verdict, hand_rotation, side_by_side
+from handrail.collect.world.tasks.catalogue import check_robot
 from handrail.collect.world.tasks.furniture import (
     BAR,
     BAR_LENGTH,
@@ -49,7 +50,7 @@ class CarryBox(Task):
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw tables, box, obstacles and the robot's start."""
-        model.description.check_hands("task CarryBox", 2)
+        check_robot("carry_box", model.description)
         side = rng.choice([-1.0, 1.0])
         tables = [
             table(name, 1.05 + rng.uniform(-0.05, 0.05), way * 1.35, (0.6, 0.8, rng.uniform(0.55, 0.70)))

@@ -1,10 +1,14 @@
 """The tasks by name; light to import."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import Registry
+
+if TYPE_CHECKING:
+    from handrail.controllers.robot.description import RobotDescription
 
 
 @dataclass(frozen=True)
@@ -22,13 +26,29 @@ class TaskSpec:
     """Channels that an operator who drives the base by itself keeps nevertheless."""
     movers: bool = False  # whether obstacles can move in it: the class has `moving_obstacles`
     hands: int = 1  # how many hands a robot needs for it
+    large: bool = False  # whether its furniture comes in one size, for robots whose world has scale 1
+    parts: bool = False  # whether its hands go ways of their own
+
+    def refuses(self, groups: Iterable[str]) -> bool:
+        """Return whether channel groups of a mode move the hands as one, which go ways of their own."""
+        return self.parts and any(group.startswith("pair") for group in groups)
+
+    def lacks(self, robot: "RobotDescription") -> str:
+        """Return what a robot would need for it, and what it has; nothing of one that can do it."""
+        scale, hands = robot.world.scale, len(robot.hands)
+        if hands < self.hands:
+            return f"with {self.hands} hands, got {robot.name} with {hands}"
+        small = self.large and scale < 1.0
+        return f"whose world has scale 1, got {robot.name} with {scale}" if small else ""
 
 
 _TASKS, _SCRIPTS = "handrail.collect.world.tasks", "handrail.collect.operators.scripted"
 _TRAY = f"{_TASKS}.tray"
+_APART: dict[str, Any] = {"hands": 2, "parts": True}
 _LEVEL: dict[str, Any] = {
     "released_channels": ("ee.wx", "ee.wy"),  # its tilt is the MPC's
     "owned_channels": ("ee.vz",),  # who drives with it in hand minds how high it is
+    "large": True,
 }
 
 
@@ -41,13 +61,13 @@ TASKS = Registry(
     "task",
     TaskSpec,
     (
-        _spec("carry_box", "CarryBox", "carry a box with both hands", hands=2),
-        _spec("drawer", "Drawer", "pull it open"),
-        _spec("fetch", "Fetch", "hold the drawer open and take the cube out", hands=2),
-        _spec("hand_over", "HandOver", "pass a bar from hand to hand into a bin", hands=2),
+        _spec("carry_box", "CarryBox", "carry a box with both hands", hands=2, large=True),
+        _spec("drawer", "Drawer", "pull it open", large=True),
+        _spec("fetch", "Fetch", "hold the drawer open and take the cube out", **_APART, large=True),
+        _spec("hand_over", "HandOver", "pass a bar from hand to hand into a bin", **_APART, large=True),
         _spec("pick_place", "PickPlace", "carry a cube into a bin"),
         _spec("reach", "Reach", "bring the hand to a pose", movers=True),
-        _spec("reach_both", "ReachBoth", "bring each hand to a pose of its own", hands=2),
+        _spec("reach_both", "ReachBoth", "bring each hand to a pose of its own", **_APART),
         _spec("tray", "Tray", "carry a tray with a can on it", objectives=f"{_TRAY}:level_tray", **_LEVEL),
         TaskSpec(
             "wide_tray",
@@ -60,3 +80,10 @@ TASKS = Registry(
         ),
     ),
 )
+
+
+def check_robot(task: str, robot: "RobotDescription") -> None:
+    """Check that a robot has the hands and the size for a task."""
+    if lacks := TASKS.find(task).lacks(robot):
+        able = ", ".join(spec.name for spec in TASKS.built_in if not spec.lacks(robot))
+        raise HandrailError(f"task {task}: expected a robot {lacks}; it can do {able}")

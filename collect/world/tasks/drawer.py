@@ -12,11 +12,11 @@ from handrail.collect.world.task import (
     Task,
     TaskState,
     Verdict,
-    check_large,
     hand_rotation,
     near_home,
     nearest_rotation,
 )
+from handrail.collect.world.tasks.catalogue import check_robot
 from handrail.collect.world.tasks.furniture import CABINET, SIDES, STEEL, WOOD, block, standing
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
@@ -98,7 +98,7 @@ class Drawer(Task):
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the cabinet, then the robot's start."""
-        check_large(model, "Drawer")
+        check_robot("drawer", model.description)
         x, y = 0.95 + rng.uniform(-0.1, 0.1), rng.uniform(-0.6, 0.6)
         body = cabinet("cabinet", x, y, rng.uniform(-0.3, 0.3), rng.uniform(0.76, 0.95))
         return Start(Scene((body, drawer("drawer", body)), _VIEW), near_home(model, rng))

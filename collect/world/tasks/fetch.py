@@ -7,6 +7,7 @@ import numpy as np
 from handrail.collect.world.observation import pose_names, pose_numbers
 from handrail.collect.world.scene import Slide
 from handrail.collect.world.task import Aim, Start, TaskState, Verdict
+from handrail.collect.world.tasks.catalogue import check_robot
 from handrail.collect.world.tasks.drawer import FLOOR, Drawer, handle, opened
 from handrail.collect.world.tasks.furniture import cube
 from handrail.controllers.arrays import FloatArray
@@ -36,7 +37,7 @@ class Fetch(Drawer):
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the cabinet, the robot's start and the cube, on the side of the hand that takes it."""
-        model.description.check_hands("task Fetch", 2)
+        check_robot("fetch", model.description)
         start = super().sample(model, rng)
         body, shut = (start.scene.find(name) for name in ("cabinet", "drawer"))
         tools = [model.pose(start.q, hand.named("tool")).position for hand in model.description.hands]

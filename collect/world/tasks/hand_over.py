@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.world.task import Start, TaskState, Verdict, check_large
+from handrail.collect.world.task import Start, TaskState, Verdict
+from handrail.collect.world.tasks.catalogue import check_robot
 from handrail.collect.world.tasks.pick_place import PickPlace
 from handrail.controllers.robot.model import RobotModel
 
@@ -25,8 +26,7 @@ class HandOver(PickPlace):
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw tables, bar, bin, obstacles and the robot's start."""
-        check_large(model, "HandOver")
-        model.description.check_hands("task HandOver", 2)
+        check_robot("hand_over", model.description)
         return super().sample(model, rng)
 
     def outcome(self, state: TaskState) -> Verdict:

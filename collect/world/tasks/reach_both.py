@@ -7,6 +7,7 @@ import numpy as np
 from handrail.collect.world.observation import pose_names, pose_numbers
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.task import Start, TaskState, Verdict
+from handrail.collect.world.tasks.catalogue import check_robot
 from handrail.collect.world.tasks.reach import VIEW, Reach, goal_marker
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
@@ -37,7 +38,7 @@ class ReachBoth(Reach):
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the posture."""
-        model.description.check_hands("task ReachBoth", 2)
+        check_robot("reach_both", model.description)
         goals, scale = _sample_goals(model, rng), model.description.world.scale
         goal, other = goals[model.number], goals[1 - model.number]
         markers = goal_marker(goal, scale), replace(goal_marker(other, scale), name=OTHER)

@@ -13,11 +13,11 @@ from handrail.collect.world.task import (
     Task,
     TaskState,
     Verdict,
-    check_large,
     hand_rotation,
     reach_share,
     side_by_side,
 )
+from handrail.collect.world.tasks.catalogue import check_robot
 from handrail.collect.world.tasks.furniture import (
     BAR,
     can,
@@ -28,6 +28,7 @@ from handrail.collect.world.tasks.furniture import (
     tray,
 )
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.objectives.objective import Objective
@@ -46,6 +47,7 @@ _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
 _MOST_TRIES = 20  # starts drawn, until the arm can hold the tray there
 _VIEW = Viewpoint(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
 _LEVEL = 20.0  # weight of its tilt
+_FREE = 0.05  # between a tray and the arm of an idle hand [m]
 APART = 0.40  # between two hands that hold it [m]
 HANDLE = np.array([0.0, 0.0, _HIGH])  # centre of the handle's bar in the tray's frame [m]
 
@@ -65,26 +67,17 @@ class Tray(Task):
     hands: int = 1  # that hold it
 
     @property
-    def _size(self) -> tuple[float, float, float]:
-        return _SIZES[self.hands - 1]
-
-    @property
     def state_names(self) -> tuple[str, ...]:
         """Tray pose, can pose, the table's top centre, obstacles (absent ones are all zero)."""
         return (*pose_names("tray"), *pose_names("can"), *names_of("table"), *obstacle_names())
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles."""
-        check_large(model, "Tray")
-        model.description.check_hands("task Tray", self.hands)
+        check_robot("wide_tray" if self.hands > 1 else "tray", model.description)
         side = rng.choice([-1.0, 1.0])
         x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
         goal = table("table", x, y, (0.6, _TABLES[self.hands - 1], rng.uniform(0.55, 0.65)))
-        q, tool = _sample_start(model, side, rng, self.hands)
-        level = tool.rotation @ np.diag(
-            [1.0, -1.0, -1.0]
-        )  # under a hand that points down, the bar along its y
-        held = tray("tray", tool.position, level, self._size, _TRAY_MASS * self.hands)
+        q, held = _sample_start(model, side, rng, self.hands)
         objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
         return Start(Scene(objects, _VIEW), q, grip=(BAR,) * self.hands)
 
@@ -114,7 +107,8 @@ class Tray(Task):
     def _stands_on(self, held: Pose, thing: Pose) -> bool:
         """Return whether the can stands upright on the tray."""
         local = held.rotation.T @ (thing.position - held.position)
-        inside = np.all(np.abs(local[:2]) < np.array(self._size[:2]) / 2) and 0.0 < local[2] < _HEIGHT
+        size = np.array(_SIZES[self.hands - 1][:2])
+        inside = np.all(np.abs(local[:2]) < size / 2) and 0.0 < local[2] < _HEIGHT
         return bool(inside) and float(held.rotation[:, 2] @ thing.rotation[:, 2]) > np.cos(0.8)
 
 
@@ -123,23 +117,38 @@ WideTray = partial(Tray, hands=2)
 
 def _sample_start(
     model: RobotModel, side: float, rng: np.random.Generator, hands: int
-) -> tuple[FloatArray, Pose]:
-    """Return a start on the far side, hands pointing down ahead of the base, and where they hold the tray."""
+) -> tuple[FloatArray, SceneObject]:
+    """Return a start on the far side, hands pointing down ahead of the base, and the tray below them."""
     place = np.zeros(3)
     for _ in range(_MOST_TRIES):
-        q, hand = _draw_start(model, side, rng)
-        q, error = side_by_side(model, q, hand, APART) if hands > 1 else arm_configuration(model, q, hand)
-        if error <= 1e-3:
-            return q, hand if hands > 1 else model.pose(q)
+        q, hand = _draw_start(model, side, rng, hands)
+        for _ in range(1 + (len(model.description.hands) > hands)):  # beside an idle hand it converges slowly
+            q, error = side_by_side(model, q, hand, APART) if hands > 1 else arm_configuration(model, q, hand)
+        tool = hand if hands > 1 else model.pose(q)
+        level = tool.rotation @ np.diag([1.0, -1.0, -1.0])  # the bar along the y of a hand that points down
+        held = tray("tray", tool.position, level, _SIZES[hands - 1], _TRAY_MASS * hands)
+        if error <= 1e-3 and _clears_idle_hands(model, q, held, hands):
+            return q, held
         place = hand.position
     raise HandrailError(
         f"task Tray: expected a robot that reaches places such as {place.round(2).tolist()} from above, "
-        f"got {model.description.name}"
+        f"clear of idle hands, got {model.description.name}"
     )
 
 
-def _draw_start(model: RobotModel, side: float, rng: np.random.Generator) -> tuple[FloatArray, Pose]:
-    """Return where the base starts, and the hand's pose there."""
+def _clears_idle_hands(model: RobotModel, q: FloatArray, held: SceneObject, hands: int) -> bool:
+    """Return whether the tray is 5 cm from the arms of hands that do not hold it."""
+    if len(model.description.hands) == hands:
+        return True
+    thing = held.carried(model.pose(q), Pose(held.position, held.rotation), model.hand.named("tool"))
+    collision = CollisionModel(model, (thing,))
+    return bool(np.min(collision.values(q[None])[0, collision.held]) >= _FREE)
+
+
+def _draw_start(
+    model: RobotModel, side: float, rng: np.random.Generator, hands: int
+) -> tuple[FloatArray, Pose]:
+    """Return where the base starts, and the hand's pose there: nearer its own side if another is idle."""
     q, ahead = np.array(model.description.home), np.eye(3)[0]
     if model.description.base.joints:
         q[:3] += rng.uniform([-0.10, -0.15, -0.15], [0.10, 0.15, 0.15])
@@ -148,6 +157,10 @@ def _draw_start(model: RobotModel, side: float, rng: np.random.Generator) -> tup
     base = model.pose(q, "planar_base").position
     away = rng.uniform(1.05, 1.20) * reach_share(model)
     place = base + away * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
+    if len(model.description.hands) > hands:
+        across = np.array([-ahead[1], ahead[0], 0.0])
+        tools = [model.pose(q, each.named("tool")).position for each in model.description.hands]
+        place += 0.5 * across * ((tools[model.number] - np.mean(tools, axis=0)) @ across)
     return q, Pose(place, hand_rotation(ahead, [0.0, 0.0, -1.0]))
 
 

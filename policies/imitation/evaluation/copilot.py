@@ -12,7 +12,7 @@ from handrail.collect.operators.scripted.input_map import StickMap
 from handrail.collect.operators.scripted.steering import Gains
 from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.catalogue import ARBITERS
-from handrail.collect.operators.shared.planning import Beside, Ensemble, Planner
+from handrail.collect.operators.shared.planning import Ensemble, Planner, ThreadedPlanner
 from handrail.collect.operators.shared.shared_operator import SharedOperator
 from handrail.collect.session.build import build_mode
 from handrail.collect.world.env import HandrailEnv
@@ -43,7 +43,7 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
         fit = ", ".join(name for name, each in MODES.items() if _is_completed(each))
         raise HandrailError(f"--mode {mode.name}: expected one that the MPC completes beside a policy: {fit}")
     asked = EvaluateConfig(
-        task=config.task, robot=config.robot, mode="" if config.mask else config.mode, fps=env.fps
+        task=config.task, robot=config.robot, mode="" if config.mask else config.mode, fps=round(env.fps)
     )
     checkpoints = [read_checkpoint(Path(folder).expanduser(), asked) for folder in config.policy]
     members = [_planner(_fitting(checkpoint, config, env), env) for checkpoint in checkpoints]
@@ -53,7 +53,7 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
             members, StickMap(env.model, mode, Gains().within(env.model.description.world)).full
         )
     if config.is_live:
-        planner = Beside(planner, env.period)
+        planner = ThreadedPlanner(planner, env.period)
     groups = Groups(Channels.of(env.model.description))
     arbiter = resolved(ARBITERS.find(config.arbiter).build)(groups, config.arbitration)
     modes = {each.name for each in (mode, *MODES.values()) if _is_completed(each)}

@@ -66,16 +66,13 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
     @property
     def task_names(self) -> tuple[str, ...]:
         """The tasks asked for."""
-        return names(self.tasks, fitting(TASKS, self._hands))
+        robot = load_description(self.robot)
+        return names(self.tasks, [name for name, spec in TASKS.items() if not spec.lacks(robot)])
 
     @property
     def mode_names(self) -> tuple[str, ...]:
         """The modes asked for."""
-        return names(self.modes, fitting(MODES, self._hands))
-
-    @property
-    def _hands(self) -> int:
-        return len(load_description(self.robot).hands)
+        return names(self.modes, fitting(MODES, len(load_description(self.robot).hands)))
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""
@@ -168,7 +165,8 @@ def run_trials(config: TrialsConfig, told: Callable[[OperatorTrial], None]) -> l
     config.check()
     file = trials_file(config)
     settings = replace(config, workers=1, ray="", json="trials.json", page="")  # what an episode depends on
-    keys = list(product(config.task_names, config.mode_names, range(config.episodes)))
+    cells = product(config.task_names, config.mode_names, range(config.episodes))
+    keys = [key for key in cells if not TASKS.find(key[0]).refuses(MODES.find(key[1]).groups("hand"))]
     jobs = [Job(" ".join(map(str, key)), run_trial, (settings, *key)) for key in keys if key not in file]
     with Execution(config, "episodes", preload=_PRELOAD) as execution:
         for result in execution.run(jobs):

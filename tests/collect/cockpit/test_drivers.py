@@ -12,7 +12,7 @@ from handrail.collect.cockpit.ahead import AHEAD, hands_ahead
 from handrail.collect.cockpit.drivers import drivers, of_person
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Preview, Source
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents, IntentSource, Preview
 from handrail.controllers.robot.model import load_model
 
 ROBOTS = ("ridgeback_ur10", "tiago_pro", "lekiwi")
@@ -39,8 +39,8 @@ def shared(channels, own, policys, rows=None, times=None):
     values = np.where(its, 0.1, 0.0) if rows is None else rows[0]
     plan = None if rows is None else Preview(rows, PERIOD * np.arange(len(rows)) if times is None else times)
     sources = [
-        Source(PERSON, theirs, mine.astype(float)),
-        Source(POLICY, replace(theirs, values=values, mask=its), (~mine).astype(float), plan),
+        IntentSource(PERSON, theirs, mine.astype(float)),
+        IntentSource(POLICY, replace(theirs, values=values, mask=its), (~mine).astype(float), plan),
     ]
     made = Intents.of(sources, (0.0,) * len(channels.hands), theirs)
     return replace(made, of_grippers=(PERSON if own else POLICY,) * len(channels.hands))

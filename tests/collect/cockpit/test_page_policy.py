@@ -17,7 +17,10 @@ from page_supervisor import PageSupervisor, misses, pick_and_place, to_the_aim
 from playwright.sync_api import expect
 from policy_helpers import untrained_act
 
+from handrail.datasets.recording.frames import BY_PERSON
+
 pytestmark = pytest.mark.slow
+HAND = slice(3, 9)  # channels of the only hand
 
 
 @pytest.fixture(scope="module")
@@ -168,15 +171,30 @@ def test_a_policy_that_fails_is_helped_to_success_with_the_keys_of_the_hand(new_
     assert len(done) == len(rows(tmp_path / "d")) == len(tries)
     assert sum(done) >= 0.8 * len(tries)
     for each in saved(tmp_path / "d"):
-        pressed = np.array(each["teleop.raw"])
-        assert not np.any(np.delete(pressed, slice(3, 9), axis=1))  # the hand alone
-        assert np.any(pressed)
+        check_owners(each)
     words = [sys.executable, "-m", "handrail.scripts", "replay", tmp_path / "d"]
     replay = subprocess.run(words, capture_output=True, text=True)
     assert replay.returncode == 0, replay.stderr
     assert [line.split()[1] for line in replay.stdout.splitlines()[3 : 3 + len(tries)]] == ["0.00e+00"] * len(
         tries
     )
+
+
+def check_owners(frames):
+    """The hand and its gripper were the person's while a key of it was held, and 0.5 s more; nothing else."""
+    pressed = np.array(frames["teleop.raw"]) != 0
+    owner, keys = np.array(frames["owner"]), pressed[:, HAND].any(axis=1)
+    assert not np.delete(pressed, HAND, axis=1).any()
+    assert not np.any(np.delete(owner, [*range(HAND.start, HAND.stop), -1], axis=1) == BY_PERSON)
+    taken, lately = (
+        np.any(owner[:, HAND] == BY_PERSON, axis=1),
+        np.convolve(keys, np.ones(11))[: len(keys)] > 0,
+    )
+    assert keys.any()
+    assert not np.any(taken & ~lately)
+    assert not np.any(keys & ~taken & owner.any(axis=1))  # nobody is an owner while the robot brakes
+    assert np.all(owner[taken, -1] == BY_PERSON)
+    assert np.array_equal(np.array(frames["intervention"]), (owner == BY_PERSON).any(axis=1))
 
 
 def never(driver, name):

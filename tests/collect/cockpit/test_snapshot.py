@@ -21,7 +21,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.sources import Intents, Source
+from handrail.controllers.interface.sources import Intents, IntentSource
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.numerics.rotation import rotation_vector
 from handrail.datasets.recording.frames import Frame
@@ -171,7 +171,9 @@ def test_a_moment_is_small_and_finite(env, person):
 
 def test_drivers_are_said_beside_a_policy_alone_and_only_while_the_robot_is_driven(env, person):
     plain, beside, moment = Snapshots(env), Snapshots(env, shared=True), frame(env)
-    moment = replace(moment, intent=Intents.of([Source("policy", moment.intent)], (0.0,), moment.intent))
+    moment = replace(
+        moment, intent=Intents.of([IntentSource("policy", moment.intent)], (0.0,), moment.intent)
+    )
 
     def policys():
         return beside.now(view(env), person, 0.0)["drivers"]["policy"]

@@ -30,7 +30,7 @@ class Watched:
             answer = act(operator, view)
             self._asked.set()
             if isinstance(answer, Intents):
-                owners = {each.name for each in answer.active}
+                owners = {each.name for each in answer.sources if each.share().any()}
                 self.seen.append("+".join(sorted(owners)))
             return answer
 

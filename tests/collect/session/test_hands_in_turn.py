@@ -2,16 +2,18 @@
 
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.world.tasks.drawer import opened
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import Pose
 
-ROBOT = "tiago_pro"
+ROBOT, NAMES = "tiago_pro", {"hand_over": "HandOver", "fetch": "Fetch"}
 
 
 class Watcher:
@@ -66,8 +68,30 @@ def test_a_drawer_that_nobody_holds_closes_before_the_hand_is_in_it():
     assert not env.task.outcome(env.task_state()).over
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("hand", ["left", "right"])
+@pytest.mark.parametrize("task", ["hand_over", "fetch"])
+def test_a_person_does_it_every_time(task, hand):
+    config = SessionConfig(task=task, mode="both", robot=ROBOT, hand=hand)
+    session = build_session(config, build_env(config, 20))
+    outcomes = [session.run(episode_seed(7500, number)) for number in range(5)]
+    assert [outcome.failure_reason for outcome in outcomes] == [""] * 5
+    assert not any(outcome.contact_onsets for outcome in outcomes)
+
+
 @pytest.mark.parametrize("task", ["hand_over", "fetch"])
 def test_a_small_robot_is_refused_in_a_line(task):
-    env = build_env(SessionConfig(task=task, robot="bi_so101"), 20)
-    with pytest.raises(HandrailError, match="expected a robot whose world has scale 1, got bi_so101"):
-        env.reset(seed=0)
+    said = (
+        f"task {task}: .* world has scale 1, got bi_so101 with 0.3; it can do pick_place, reach, reach_both"
+    )
+    with pytest.raises(HandrailError, match=said):
+        build_env(SessionConfig(task=task, robot="bi_so101"), 20)
+    with pytest.raises(HandrailError, match=f"task {task}: "):
+        gymnasium.make(f"handrail/{NAMES[task]}-v0", robot="bi_so101").reset(seed=0)
+
+
+@pytest.mark.parametrize("task", ["hand_over", "fetch", "reach_both"])
+def test_hands_that_move_as_one_cannot_take_turns(task):
+    config = SessionConfig(task=task, mode="pair", robot=ROBOT)
+    with pytest.raises(HandrailError, match=f"mode pair: .* as in mode both, for task {task}"):
+        build_session(config, build_env(config, 20))

@@ -13,7 +13,8 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.by_input import ByMask
-from handrail.collect.operators.shared.planning import Beside
+from handrail.collect.operators.shared.planning import ThreadedPlanner
+from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.collect.operators.shared.shared_operator import SharedOperator
 from handrail.collect.session.build import build_controller, build_env
 from handrail.collect.session.loop import EpisodeLoop
@@ -71,8 +72,8 @@ class Episode:
         channels = Channels.of(env.model.description)
         self.slow, self.hand = Gated(channels, rows), Hand(channels)
         self._loop = EpisodeLoop(env, build_controller(MODES["ee"], env.model, 20))
-        arbiter = ByMask(Groups(channels))
-        self._operator = SharedOperator(self.hand, Beside(self.slow, PERIOD), arbiter, env.model)
+        arbiter = ByMask(Groups(channels), ArbiterSettings())
+        self._operator = SharedOperator(self.hand, ThreadedPlanner(self.slow, PERIOD), arbiter, env.model)
         self._operator.reset(self._loop.begin(0), np.random.default_rng(0))
 
     def step(self):

@@ -5,6 +5,7 @@ import io
 import json
 import re
 from contextlib import closing
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from handrail.collect.commands.replay import replay_episode
 from handrail.collect.session.build import build_env, session_features
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.intent import Intent, RawInput
-from handrail.controllers.interface.sources import PERSON, POLICY, Intents, Source
+from handrail.controllers.interface.sources import PERSON, POLICY, Intents, IntentSource
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.schema import check_frame
@@ -74,7 +75,7 @@ def test_no_shared_column_is_ever_infinite(number, of_policy):
     good, mask = Intent(np.ones(3), np.array([True, False, True])), np.array([True, True, False])
     bad = Intent(np.full(3, number), mask, (number,), raw=RawInput(age=number))
     one, other = (bad, good) if of_policy else (good, bad)
-    both = Intents.of([Source(POLICY, one), Source(PERSON, other)], (number,), other)
+    both = Intents.of([IntentSource(POLICY, one), IntentSource(PERSON, other)], (number,), other)
     still = np.zeros(2)
     for intent in (both, bad):
         frame = Frame(still, np.zeros(1), {}, intent, still, still, Diagnostics(), 0, False, False, 0.0, 0)
@@ -108,7 +109,8 @@ def test_edits_keep_the_columns(edit, takeovers, tmp_path):
         for name in SHARED:
             assert np.array_equal(kept[name], whole[name][first:][: row["length"]]), name
     opened = LeRobotDataset("handrail/set", root=new)
-    assert opened[7]["owner"].shape == read_info(new).features["owner"].shape
+    item: dict[str, Any] = opened[7]
+    assert item["owner"].shape == read_info(new).features["owner"].shape
 
 
 def test_a_demonstration_beside_take_overs_says_that_its_operator_drove(takeovers, tmp_path):

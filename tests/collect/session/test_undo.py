@@ -1,6 +1,9 @@
 """Laws: after an undo all goes on from the last pause as if nothing had been since, and the data say so."""
 
+import io
+import tempfile
 import weakref
+from dataclasses import replace
 
 import av
 import numpy as np
@@ -13,6 +16,7 @@ from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.reach import Reach
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
@@ -100,6 +104,27 @@ def test_pictures_are_those_of_what_was_not_undone_and_wait_outside_of_memory(tm
         undone, plain, other = (pictures(tmp_path / name, camera) for name in ("undone", "plain", "left"))
         assert undone.shape == plain.shape
         assert np.abs(undone - plain).sum() < 0.1 * np.abs(other - plain).sum()
+
+
+def test_pictures_that_are_cut_short_are_said_in_a_line(tmp_path, monkeypatch):
+    class Short(io.BytesIO):
+        def read(self, size=-1):
+            return super().read(size)[:-1]
+
+    class Watcher(list):
+        def begin(self, env, seed):
+            pass
+
+        see = list.append
+
+    env, frames = HandrailEnv(Reach(), MODEL, fps=FPS, plant=IdealRobot), Watcher()
+    Session(env, MaskedMpc(MODEL), Person([(FORTH, 1), (SUCCESS, 1)]), [frames]).run(3)
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: Short())
+    with recording(tmp_path / "d", env) as recorder:
+        seen = replace(frames[0], images={"front": np.zeros((4, 4, 3), np.uint8)})
+        recorder.see(replace(seen, number=0, safe=0))
+        with pytest.raises(HandrailError, match=r"^cannot read the pictures .* frame 0: .* 47 of 48 bytes"):
+            recorder.see(replace(seen, number=1, safe=1))
 
 
 def pictures(root, camera):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, build_session
 from handrail.controllers.collision.model import CollisionModel
@@ -68,6 +69,15 @@ def test_a_person_brings_one_hand_after_the_other(env):
     assert outcome.contact_onsets == 0
 
 
+@pytest.mark.parametrize("hand", ["left", "right"])
+def test_arms_of_five_joints_reach_both(hand):
+    config = SessionConfig(task="reach_both", robot="bi_so101", mode="both", hand=hand)
+    session = build_session(config, build_env(config, 20))
+    outcomes = [session.run(episode_seed(1000, number)) for number in (8, 67, 79)]  # one by one they did not
+    assert all(outcome.success for outcome in outcomes)
+    assert not any(outcome.contact_onsets for outcome in outcomes)
+
+
 def test_a_robot_with_one_hand_is_refused():
-    with pytest.raises(HandrailError, match="reach_both"):
+    with pytest.raises(HandrailError, match="task reach_both: expected a robot with 2 hands, got ridgeback"):
         build_env(SessionConfig(task="reach_both"), 20)

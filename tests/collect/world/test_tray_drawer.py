@@ -10,6 +10,7 @@ from handrail.collect.commands.recording import episode_seed
 from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.drawer import HANDLE, TRAVEL, Drawer, handle, inward, opened
 from handrail.collect.world.tasks.tray import Tray
+from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.description import robot_names
 from handrail.controllers.robot.model import load_model
 
@@ -140,6 +141,19 @@ def test_tray_scenes_follow_their_description(robot):
         tool = model.pose(start.q).position
         np.testing.assert_allclose(tool - tray.position, [0, 0, 0.2], atol=1e-3)
     assert sides == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize("hand", ["left", "right"])
+def test_a_tray_starts_clear_of_the_idle_hand(hand):
+    """By 5 cm, fingers included."""
+    model, idle = load_model("tiago_pro").with_hand(hand), {"left": "right", "right": "left"}[hand]
+    for seed in SEEDS:
+        start = Tray().sample(model, np.random.default_rng(seed))
+        collision = CollisionModel(model, (start.scene.find("tray").obstacle(),))
+        near = collision.values(start.q[None])[0]
+        rows = [row for row, (a, b) in enumerate(collision.pairs) if b == "tray" and a.startswith(idle)]
+        assert rows
+        assert near[rows].min() > 0.05
 
 
 def test_drawer_scenes_follow_their_description():
