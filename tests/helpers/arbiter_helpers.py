@@ -1,6 +1,7 @@
 """A person and a policy that do as a test says, and the arbiters that decide between them."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -95,7 +96,7 @@ class Both:
         q = self.model.description.home if q is None else q
         return View(State(q, np.zeros(self.model.size) if v is None else v, self.time), None)
 
-    def act(self, person=None, policy=None, seconds=0.0):
+    def act(self, person=None, policy=None, seconds=0.0) -> Any:
         """Let them say something, for some time; return the last answer."""
         self.person.says = self.person.says if person is None else person
         self.policy.says = self.policy.says if policy is None else policy

@@ -131,7 +131,7 @@ export class Marks {
     this.balls.forEach((ball, index) => {
       ball.visible = index < points.length;
       if (ball.visible) ball.position.set(...points[index]);
-      ball.scale.setScalar(this.scale);
+      ball.scale.setScalar(1.7 * this.scale);
     });
   }
 

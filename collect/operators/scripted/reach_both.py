@@ -1,4 +1,4 @@
-"""How an operator brings two hands to a pose each: both before the goals, then both to them."""
+"""How an operator brings two hands to a pose each: one after the other; with short arms both at once."""
 
 from functools import partial
 
@@ -15,11 +15,11 @@ class ReachBothScript(PhasedScript):
     """Reaches both goals of `handrail/ReachBoth-v0`; a script."""
 
     def replan(self, view: View, name: str) -> list[ScriptPhase] | None:
-        """Begin again when one hand after the other did not do either."""
+        """Begin again when the second hand is there: the first may have been moved."""
         return self.plan(view) if name == "other" else None
 
     def plan(self, view: View) -> list[ScriptPhase]:
-        """Return the way: hands as at home before both goals, then both to these; if not, one by one."""
+        """Return the way of one hand, then of the other; short arms first try both at once."""
         task, goal, other = view.task, view.task.goal or view.tool, view.task.pose(OTHER)
         x, y, _ = (goal.position - other.position) * (1 if task.hand == 0 else -1)
         yaw = float(np.arctan2(-x, y))
@@ -27,10 +27,9 @@ class ReachBothScript(PhasedScript):
         base = np.array([*((goal.position + other.position)[:2] / 2 - ahead), yaw])
         q = np.concatenate([base, self._model.description.home[3:]])
         home = [self._model.pose(q, hand.named("tool")) for hand in self._model.description.hands]
-        at = partial(ScriptPhase, base=base, distance=0.05 * self._scale, angle=0.2)
-        return [
-            at(home[task.hand], also=home[1 - task.hand], patience=10.0),
-            at(goal, also=other, distance=0.0, patience=12.0),
-            *turns(False, 0.0, [at(goal, patience=10.0)]),
-            *turns(True, 0.0, [at(other, name="other", patience=10.0)]),
-        ]
+        near = partial(ScriptPhase, base=base, distance=0.05 * self._scale, angle=0.2, patience=20.0)
+        one, two = turns(False, 0.0, [near(goal)]), turns(True, 0.0, [near(other, name="other")])
+        if np.count_nonzero(self._model.moving) - len(self._model.description.base.joints) >= 6:
+            return [*one, *two]
+        before = near(home[task.hand], also=home[1 - task.hand], patience=10.0)
+        return [before, near(goal, also=other, distance=0.0, patience=12.0), *one, *two]

@@ -5,6 +5,7 @@ A gate opens when the test says so, so that an answer takes as long as the test 
 
 import threading
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -78,8 +79,9 @@ class Episode:
 
     def step(self):
         """Step; return the frame and the channels that each has."""
-        frame = self._loop.step(self._operator.act(self._loop.look()))
-        sources = {each.name: each for each in frame.intent.sources}
+        asked: Any = self._operator.act(self._loop.look())
+        frame = self._loop.step(asked)
+        sources = {each.name: each for each in asked.sources}
         return frame, {name for name in sources if np.any(sources[name].share())}
 
     def until_policy(self):

@@ -1,6 +1,7 @@
 """A person and a policy as one operator: who is heard, what brakes, whose the grippers are."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -213,7 +214,7 @@ def test_hand_overs_keep_the_limits_of_acceleration(name):
             person.says = asks(*groups[rng.integers(6)], value=rng.choice([0.0, 0.0, 1.0, -1.0]))
             policy.says = asks(*groups[rng.integers(6)], value=rng.choice([1.0, -1.0, np.nan]))
             policy.doubt = rng.choice([0.0, 1.0])
-        found = operator.act(View(robot.state, None))
+        found: Any = operator.act(View(robot.state, None))
         robot.update(found)
         owners.add(tuple(source.name for source, *_ in found.terms))
     limits = ONE.description.limits
