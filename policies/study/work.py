@@ -138,7 +138,7 @@ def work(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> dict[str, A
 def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
     """Record in turns of a few episodes, each by another person, until there is enough.
 
-    In rounds, episodes that do not fit into the operator's time any more are removed.
+    In rounds, episodes that do not fit into the operator's time any more are removed, but for the first.
     """
     from handrail.collect.commands.record import record
 
@@ -164,7 +164,8 @@ def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
             raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
     if design.rounds:
         ends = np.cumsum([row["length"] for row in rows]) / FPS / 60.0
-        late = {row["episode_index"] for row, end in zip(rows, ends, strict=True) if end > need["minutes"]}
+        count = max(1, np.count_nonzero(ends <= need["minutes"]))
+        late = {row["episode_index"] for row in rows[count:]}
         drop_episodes(root, lambda row: row["episode_index"] in late)
 
 
@@ -177,6 +178,12 @@ def _learnt_from(cell: StudyCell, layout: StudyLayout) -> Path:
     return merge_datasets(parts, root).root
 
 
+def _is_corrected(root: Path) -> bool:
+    """Return whether a person took over in some successful episode: else there is nothing to weigh."""
+    learnt = (episode for episode in recorded_episodes(root) if episode.success)
+    return any(map(_steered, each_opened(learnt)))
+
+
 def _train_and_evaluate(
     job: StudyJob, policy: StudyPolicy, design: StudyDesign, layout: StudyLayout
 ) -> dict[str, Any]:
@@ -184,9 +191,12 @@ def _train_and_evaluate(
     from handrail.policies.imitation.evaluation.evaluation import evaluate
     from handrail.policies.imitation.training.training import train
 
-    start, cell = time.monotonic(), policy.cell
-    folder = train(training(policy, design, _learnt_from(cell, layout), layout.policy(policy)))
-    remove(layout.merged(cell))
+    start, root = time.monotonic(), _learnt_from(policy.cell, layout)
+    config = training(policy, design, root, layout.policy(policy))
+    if config.corrections == "weighted" and not _is_corrected(root):
+        config = replace(config, corrections="all")
+    folder = train(config)
+    remove(layout.merged(policy.cell))
     trained = time.monotonic()
     for what, config in evaluations(job, design, str(folder)).items():
         file = layout.evaluation(policy, what)
