@@ -108,7 +108,12 @@ class Hub:
             self._lose()
         self._lease.leave(page.name)
         self._tell_all()
-        asyncio.get_running_loop().call_later(1.01 * RESERVED, self._tell_all)  # others may drive then
+        asyncio.get_running_loop().call_later(1.01 * RESERVED, self._settle)
+
+    def _settle(self) -> None:
+        """Let whoever asks drive when nobody has come back to the lease; say so."""
+        self._lease.settle()
+        self._tell_all()
 
     async def _listen(self, page: PageSocket, delivery: "asyncio.Task[None]") -> None:
         """Take a page's messages; one that is cut off may still say STOP."""

@@ -46,6 +46,11 @@ class Lease:
         if page == self.asking:
             self.asking = ""
 
+    def settle(self) -> None:
+        """Let whoever asks drive if nobody does any more."""
+        if self.asking and self.is_free_for(self.asking):
+            self.take(self.asking)
+
     def drives(self, page: str) -> bool:
         """Whether it is this page that drives."""
         return self._is_there and page == self.holder

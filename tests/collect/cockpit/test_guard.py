@@ -106,6 +106,19 @@ def test_one_page_drives_and_a_reload_keeps_its_place(clock):
     assert not lease.drives("first")
 
 
+def test_a_page_that_asked_while_another_was_expected_back_drives_when_it_is_not(clock):
+    lease = Lease(clock)
+    lease.take("first")
+    lease.leave("first")
+    assert not lease.take("second")
+    lease.settle()
+    assert not lease.drives("second")
+    clock.now += 6.0
+    lease.settle()
+    assert lease.drives("second")
+    assert not lease.asking
+
+
 def test_the_driver_gives_the_lease_to_who_asks(clock):
     lease = Lease(clock)
     lease.take("first")

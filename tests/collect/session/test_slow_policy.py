@@ -4,6 +4,7 @@ A gate opens when the test says so, so that an answer takes as long as the test 
 """
 
 import threading
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -34,7 +35,8 @@ class Gated:
     doubt = 0.0
 
     def __init__(self, channels, rows):
-        self.gate, self._rows, self._channels = threading.Semaphore(0), rows, channels
+        self.gate, self.answered = threading.Semaphore(0), threading.Semaphore(0)
+        self._rows, self._channels = rows, channels
 
     def reset(self, view, rng):
         pass
@@ -49,7 +51,9 @@ class Gated:
         return self._now
 
     def chunk(self):
-        return [replace(self._now, time=self._now.time + n * PERIOD) for n in range(1, self._rows)]
+        planned = [replace(self._now, time=self._now.time + n * PERIOD) for n in range(1, self._rows)]
+        self.answered.release()
+        return planned
 
 
 class Hand:
@@ -85,12 +89,15 @@ class Episode:
         return frame, {name for name in sources if np.any(sources[name].share())}
 
     def until_policy(self):
-        """Open the gate for one answer; step until it is there."""
+        """Open the gate for one answer; step as soon as it is there, in the robot's time."""
+        self.step()  # so that it has been asked
         self.slow.gate.release()
-        for _ in range(1000):
+        assert self.slow.answered.acquire(timeout=60.0)
+        for _ in range(100):
             frame, drivers = self.step()
             if POLICY in drivers:
                 return frame
+            time.sleep(0.05)  # for the thread to hand it over
         raise AssertionError("no answer")
 
 
