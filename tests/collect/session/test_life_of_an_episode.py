@@ -203,6 +203,7 @@ def test_other_programs_wait_for_a_loop_in_real_time_until_it_ends(env, monkeypa
     """However it ends; threads that it begins do not come first."""
     said = []
     monkeypatch.setattr(os, "sched_setscheduler", lambda *words: said.append(words[:2]))
+    monkeypatch.setattr(os, "sched_getscheduler", lambda process: os.SCHED_OTHER)
 
     class Failing(Rehearsal):
         def act(self, view):
