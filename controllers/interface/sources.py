@@ -180,5 +180,5 @@ class Preview:
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        index = self.times.searchsorted(intent.time + times + _ROUNDING, side="right") - 1
-        return self.values[np.maximum(index, 0)]
+        index = self.times.searchsorted(times + (intent.time + _ROUNDING), "right") - 1
+        return self.values.take(index, 0, mode="clip")

@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
@@ -117,11 +118,11 @@ class Lately:
 
     Args:
         groups: of the robot's channels.
-        handback: how long after it was moved last [s].
+        settings: how long after it was moved last, and what an arbiter that goes by this needs besides.
     """
 
-    def __init__(self, groups: Groups, handback: float) -> None:
-        self._groups, self._handback = groups, handback
+    def __init__(self, groups: Groups, settings: ArbiterSettings) -> None:
+        self._groups, self._settings = groups, settings
         self.reset()
 
     def reset(self) -> None:
@@ -132,4 +133,4 @@ class Lately:
         """Return the channels that are the person's now, (m,); a clock that was set back changes nothing."""
         moved = self._groups.moved(wishes.person)
         self._last[moved] = wishes.time
-        return moved | (wishes.person.mask & (np.abs(wishes.time - self._last) < self._handback))
+        return moved | (wishes.person.mask & (np.abs(wishes.time - self._last) < self._settings.handback))

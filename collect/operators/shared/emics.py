@@ -167,7 +167,7 @@ class LevelSwitcher:
     """
 
     def __init__(self, groups: Groups, settings: ArbiterSettings, criteria: Sequence[Criterion]) -> None:
-        self._groups, self._lately = groups, Lately(groups, settings.handback)
+        self._groups, self._lately = groups, Lately(groups, settings)
         self._dwell, self._criteria = settings.dwell, criteria
         self.reset()
 

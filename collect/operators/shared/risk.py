@@ -1,37 +1,27 @@
 """The policy asks for help: while it is unsure it drives nothing."""
 
-from handrail.collect.operators.shared.arbiter import Groups, Lately, Shares, Wishes
-from handrail.collect.operators.shared.settings import ArbiterSettings
+from handrail.collect.operators.shared.arbiter import Lately, Shares, Wishes
 
 _CALM = 0.5  # of the doubt that asks for help: below it the policy drives again
 
 
-class Risk:
+class Risk(Lately):
     """As `ByMask`; but while the policy is unsure, it has nothing: `doubt > δ`, until `doubt ≤ δ / 2`.
 
     If the person moves nothing then, nobody drives, and the robot brakes and waits for them. A doubt that is
     no number is one. An ensemble's spread as doubt is that of EnsembleDAgger (Menda et al., 2019); to ask at
     one threshold and to go on at a lower one that of ThriftyDAgger (Hoque et al., 2021), whose learned risk
     of failing and budget of interventions are not here.
-
-    Args:
-        groups: of the robot's channels.
-        settings: δ, and how long a group stays the person's.
     """
-
-    def __init__(self, groups: Groups, settings: ArbiterSettings) -> None:
-        self._groups, self._doubt = groups, settings.doubt
-        self._lately = Lately(groups, settings.handback)
-        self._asks = False
 
     def reset(self) -> None:
         """Begin an episode."""
-        self._lately.reset()
+        super().reset()
         self._asks = False
 
     def shares(self, wishes: Wishes) -> Shares:
         """Return 1 where a source is the owner, 0 elsewhere."""
-        owned = self._lately.owned(wishes)
-        self._asks = not wishes.doubt <= self._doubt * (_CALM if self._asks else 1.0)
+        owned = self.owned(wishes)
+        self._asks = not wishes.doubt <= self._settings.doubt * (_CALM if self._asks else 1.0)
         free = ~self._groups.taken(owned) & (not self._asks)
         return Shares(owned.astype(float), free.astype(float))

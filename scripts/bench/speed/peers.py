@@ -14,6 +14,8 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.core.library import Memory, functions
 from handrail.controllers.errors import imported
 from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.sources import Intents, IntentSource, Preview
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.solvers.converged import ConvergedSolver
 from handrail.controllers.solvers.dense import dense
@@ -229,7 +231,29 @@ def _piqp(loop: TimingLoop) -> Take:
     return take
 
 
+def _two_sources(loop: TimingLoop) -> Take:
+    """Return our own update where a policy that plans ahead asks for half of the channels."""
+    mpc = MaskedMpc(loop.model, loop.mpc.settings)
+
+    def take(update: Update) -> Solve:
+        mpc.loop = update.before
+        intent, owned = update.intent, update.intent.mask.cumsum()
+        its = intent.mask & (owned <= owned[-1] // 2)
+        plan = Preview(np.tile(intent.values, (20, 1)), intent.time + PERIOD * np.arange(20))
+        person = IntentSource("person", replace(intent, mask=intent.mask & ~its))
+        policy = IntentSource("policy", replace(intent, mask=its), 1.0, plan)
+        both = Intents.of((person, policy), intent.grippers, intent)
+
+        def solve() -> FloatArray | None:
+            mpc.update(update.state, both)
+            return None if mpc.plan is None else mpc.plan.u
+
+        return solve
+
+    return take
+
+
 PEERS: dict[str, Callable[[TimingLoop], Take]] = {
-    each.__name__.strip("_"): each for each in (_ipopt, _mink, _pink, _own_qp, _daqp, _piqp)
+    each.__name__.strip("_"): each for each in (_ipopt, _mink, _pink, _own_qp, _daqp, _piqp, _two_sources)
 }
 """The solvers by name."""

@@ -50,7 +50,8 @@ class SpeedConfig(ReportConfig):
     updates: Annotated[int, Meta(ge=10)] = 400
     """Timed updates of every case."""
     peers: Names = "all"
-    """Solvers beside it, or all that are installed: ipopt, mink, pink, own_qp, daqp, piqp; empty for none."""
+    """What is timed beside it, or all that is installed: ipopt, mink, pink, own_qp, daqp, piqp, two_sources;
+    empty for nothing."""
     solves: AtLeastOne = 40
     """Updates of a case whose problem the peers solve too."""
     tasks: Names = "reach,pick_place"
@@ -207,7 +208,7 @@ def speed_figure(rows: SpeedRows, config: SpeedConfig) -> Any:
             medians, worst = ([row["cpu"][name] for row in line] for name in ("median_ms", "p99_ms"))
             axes.plot(pairs, medians, "o-", color=colour, ms=4, label=f"{degrees} degrees of freedom")
             axes.plot(pairs, worst, ":", color=colour, lw=1.0)
-        for marker, name in zip("x+1234", PEERS, strict=True):  # of the first robot
+        for marker, name in zip("x+1234|", PEERS, strict=True):  # of the first robot
             line = [rows[SpeedCase(config.degrees[0], pairs, horizon).name] for pairs in config.pairs]
             points = [
                 (row["watched_pairs"], row["peers"][name]["cpu"]["median_ms"])

@@ -11,6 +11,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.ocp.problem import Plan, Problem
@@ -77,6 +78,7 @@ class Update:
     """One timed update: what went in, what came out, and how long it took."""
 
     cpu: float  # [s]
+    before: LoopState
     obstacles: tuple[Obstacle, ...]
     state: State
     intent: Intent
@@ -120,11 +122,12 @@ class TimingLoop:
             self._intent = self._random_intent(state)
         intent = replace(self._intent, time=state.time)
         problem = self.mpc.build_problem(state, intent)
-        guess = self.mpc.loop.guess(state.time, self.case.horizon, self.model.size)
+        before = self.mpc.loop
+        guess = before.guess(state.time, self.case.horizon, self.model.size)
         command = self.times.of(self.mpc.update, state, intent)
         after = command.velocity(PERIOD)
         self._state = State(state.q + 0.5 * PERIOD * (state.v + after), after, state.time + PERIOD)
-        asked = self._obstacles, state, intent, problem, guess
+        asked = before, self._obstacles, state, intent, problem, guess
         return Update(self.times.cpu[-1], *asked, self.mpc.plan, command.diagnostics.status)
 
     def _random_scene(self) -> tuple[Obstacle, ...]:

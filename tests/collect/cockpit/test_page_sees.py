@@ -31,7 +31,7 @@ _FRAMED = """async ([width, height, points]) => {
     const base = new THREE.Group(), tool = new THREE.Group(), aim = new THREE.Vector3(...goal);
     tool.position.set(...hand);
     cameras.stage({ scale: 1 });
-    cameras.frame(base, tool, aim);
+    cameras.frame(base, tool, [tool], aim);
     cameras.camera.lookAt(cameras.controls.target);
     cameras.camera.updateMatrixWorld();
     const at = [tool.position, aim].map((each) => each.clone().project(cameras.camera));
