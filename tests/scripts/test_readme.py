@@ -9,6 +9,7 @@ import pytest
 from command_helpers import command
 from graphics import graphics_trouble
 from pages import PAGES, commands, text
+from places import ROOT
 
 READ_ON = ("recording", "large_datasets", "training", "evaluation", "comparison")
 MAIN = ("README.md", *(f"docs/{name}.md" for name in READ_ON))
@@ -16,6 +17,7 @@ SMALL = {  # what a command gets, given on the page or not
     "handrail-demo": "--episodes 1",
     "handrail-record": "--dataset.num_episodes 2",
     "handrail-train": "--steps 4 --batch_size 4 --device cpu",
+    "handrail-encoder": "--updates 2 --batch_size 2",
     "handrail-evaluate": "--episodes 2 --time_limit 1 --workers 1",
     "bench operators": "--episodes 1 --workers 1",
     "bench goal_reaching": "--goals 2 --workers 1",
@@ -26,6 +28,7 @@ SMALL = {  # what a command gets, given on the page or not
 }
 WHERE_GIVEN = {"handrail-train": "--episodes 1 --minutes 0.1", "handrail-study": "--workers 2"}
 PRESET = "policies/study/presets/quick.toml"
+STUDIES = {each.stem for each in (ROOT / "policies/study/presets").glob("*.toml")}
 LESS_STUDY = {"rollouts": "2", "persons": "1", "episodes": "2", "minutes": "0.3", "steps": "4"}
 NOT_RUN = {
     "make": "sets up and tests this very clone",
@@ -39,7 +42,7 @@ NOT_RUN = {
 
 def made_small(words: list[str]) -> list[str]:
     """Return a command with fewer episodes, steps and the like, and studies by a small design."""
-    name, *words = [PRESET if word in ("quick", "factors", "protected") else word for word in words]
+    name, *words = [PRESET if word in STUDIES else word for word in words]
     for given, flags in ((False, SMALL), (True, WHERE_GIVEN)):
         pairs = flags.get(name, "").split()
         for flag, value in zip(pairs[::2], pairs[1::2], strict=True):
