@@ -1,0 +1,32 @@
+"""A published study's numbers, computed anew by a script that shares no code with the report."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+from places import ROOT
+
+RESULTS = ROOT / "docs" / "results"
+LINE = r"(\w+): (\S+) \((\S+) to (\S+)\), 8 draws, p (\S+), after Holm (\S+)"
+
+
+def test_what_was_declared_comes_out_as_published():
+    archive = RESULTS / "teleop_modes_factors.tar.xz"
+    design = ROOT / "policies" / "study" / "presets" / "factors.toml"
+    done = subprocess.run(
+        [sys.executable, RESULTS / "recompute.py", archive, design],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = {name: [float(each) for each in numbers] for name, *numbers in re.findall(LINE, done.stdout)}
+    published = json.loads((RESULTS / "teleop_modes_factors.json").read_text())["contrasts"]
+    declared = {each["name"].partition(":")[0]: each for each in published if each["kind"] == "declared"}
+    assert len(declared) == 3
+    assert found.keys() == declared.keys()
+    for name, each in declared.items():
+        estimate = each["estimate"]
+        shares = [100 * share for share in (estimate["value"], *estimate["interval"])]
+        assert found[name] == pytest.approx([*shares, estimate["p"], each["p_adjusted"]], abs=1e-3)
