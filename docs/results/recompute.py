@@ -1,9 +1,9 @@
 """Compute what a study declared anew from its archive, without Handrail.
 
-`python docs/results/recompute.py ARCHIVE.tar.xz DESIGN.toml`. Of a policy in a draw the share s of its rollouts
-that succeed; a contrast is Σ w s, its mean over tasks the replicate. Student's t over draws, whose variance is
-at least Σ w² p (1 − p) / R, that of R rollouts by chance, with p of all draws after two successes and two
-failures more. Holm over the declared contrasts; where there is a margin, two one-sided t tests.
+`python docs/results/recompute.py ARCHIVE.tar.xz DESIGN.toml`. Of a policy in a draw the share s of its
+rollouts that succeed; a contrast is Σ w s, its mean over tasks the replicate. Student's t over draws, whose
+variance is at least Σ w² p (1 − p) / R, that of R rollouts by chance, with p of all draws after two successes
+and two failures more. Holm over the declared contrasts; where there is a margin, two one-sided t tests.
 """
 
 import json
