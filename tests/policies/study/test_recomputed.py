@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from places import ROOT
 
@@ -30,3 +31,33 @@ def test_what_was_declared_comes_out_as_published():
         estimate = each["estimate"]
         shares = [100 * share for share in (estimate["value"], *estimate["interval"])]
         assert found[name] == pytest.approx([*shares, estimate["p"], each["p_adjusted"]], abs=1e-3)
+
+
+def test_the_metric_that_goes_with_success_is_named_first(tmp_path):
+    rng, draws = np.random.default_rng(0), range(3)
+    shares = {(mode, draw): rng.random() for mode in "abcd" for draw in draws}
+    jobs = {
+        f"collect/reach/{mode}/{draw}": {"result": {"quality": {"telling": -share, "other": rng.random()}}}
+        for (mode, draw), share in shares.items()
+    }
+    conditions = [
+        {
+            "task": "reach",
+            "label": mode,
+            "treatment": "",
+            "draws": {str(draw): shares[mode, draw] for draw in draws},
+        }
+        for mode in "abcd"
+    ]
+    study = {"design": {"draws": 3}, "jobs": jobs, "conditions": conditions}
+    (tmp_path / "study.json").write_text(json.dumps(study))
+    done = subprocess.run(
+        [sys.executable, RESULTS / "metrics.py", tmp_path / "study.json"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    count, first, other = done.stdout.splitlines()
+    assert count == "1 groups, 12 policies"
+    assert first.startswith("telling: -1.00 (-1.00 to -1.00), p ")
+    assert other.startswith("other: ")
