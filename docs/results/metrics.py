@@ -1,10 +1,10 @@
 """Say which quality metric of demonstrations goes with the success of policies.
 
-`python docs/results/metrics.py STUDY.json …`. Spearman's ρ of a metric of a recording and the success of the
-policy that learnt from it, over modes and draws of a study, a task and an amount of data; ρ is the mean over
-these. Its interval: 95 % of ρ over modes drawn anew with their draws. p: how often some metric has a larger |ρ|
-where success is given to modes by chance, so that it holds for all metrics together. Explores: modes differ in
-more than one metric.
+`python docs/results/metrics.py STUDY.json …`. Spearman's ρ of a metric of a recording and the success of
+the policy that learnt from it, over modes and draws of a study, a task and an amount of data; ρ is the mean
+over these. Its interval: 95 % of ρ over modes drawn anew with their draws. p: how often some metric has a
+larger |ρ| where success is given to modes by chance, so that it holds for all metrics together. Explores:
+modes differ in more than one metric.
 """
 
 import json
