@@ -35,7 +35,7 @@ class NewRobotConfig:
         """Check the settings."""
         check_settings(self, "--")
         check_file("--output", self.output, ".toml")
-        if "" in self.frames and len(self.frames) > 1:
+        if "," in self.hands and ("" in self.frames or self.hands.count("=") > len(self.frames)):
             raise HandrailError(f"--hands {self.hands}: expected NAME=LINK of each of several hands")
 
     @property

@@ -3,7 +3,9 @@
 import time
 from pathlib import Path
 
+from handrail.collect.config import SessionConfig
 from handrail.collect.robot_config import CheckRobotConfig, NewRobotConfig
+from handrail.collect.session.build import build_env
 from handrail.controllers.errors import FAILED, HandrailError
 from handrail.controllers.modelling.checks import faults
 from handrail.controllers.modelling.making import RobotMaker
@@ -56,6 +58,10 @@ def _output(config: NewRobotConfig, source: Source) -> Path:
 def check_robot(config: CheckRobotConfig) -> int:
     """Print what is wrong with a robot, draw it; return the exit code."""
     found, say = faults(config.robot), Terminal().print
+    try:
+        build_env(SessionConfig(task="reach", robot=config.robot), 20).reset(seed=0)
+    except HandrailError as error:
+        found = found or [str(error)]
     for fault in found:
         say(fault)
     if config.picture:

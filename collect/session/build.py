@@ -21,6 +21,7 @@ from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Task
 from handrail.collect.world.tasks.catalogue import TASKS, check_robot
 from handrail.controllers.baselines.catalogue import CONTROLLERS
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
@@ -143,6 +144,10 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
     if config.mask:
         own = mode_of_mask(config.mask, Channels.of(model.description), mode.controller)
         mode = replace(own, task_objectives=mode.task_objectives)
+    if missing := _missing(mode, model):
+        raise HandrailError(
+            f"mode {mode.name}: expected a robot with channels {missing}, got {model.description.name}"
+        )
     if not (CONTROLLERS.find(mode.controller).objectives and mode.task_objectives):
         return mode
     return mode.leaving(task.released_channels, task.owned_channels)
@@ -151,16 +156,21 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
 def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:
     """Return the modes that a person can change to, by name: all for the robot, and that of the settings."""
     fit = fitting(MODES, len(env.model.description.hands))
-    there = [name for name, mode in fit.items() if mode.available]
-    modes = [build_mode(replace(config, mode=name, mask=""), env.model) for name in there]
-    channels, hand = Channels.of(env.model.description), env.model.hand.name
     known = [
-        mode
-        for mode in modes
-        if channels.have(*mode.owned("hand", hand), *mode.owned("base", hand))
+        build_mode(replace(config, mode=name, mask=""), env.model)
+        for name, mode in fit.items()
+        if mode.available
+        and not _missing(mode, env.model)
         and CONTROLLERS.find(mode.controller).fits(env.model.description)
     ]
     return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
+
+
+def _missing(mode: TeleopMode, model: RobotModel) -> str:
+    """Return the channels of a mode that a robot does not have, such as `torso`."""
+    channels, hand = Channels.of(model.description), model.hand.name
+    owned = dict.fromkeys((*mode.owned("hand", hand), *mode.owned("base", hand)))
+    return ", ".join(group for group in owned if not channels.have(group))
 
 
 def session_features(env: HandrailEnv, shared: bool = False) -> dict[str, Feature]:

@@ -36,7 +36,8 @@ from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import Fraction, Positive, Text, decoded
 
 SCENE_CAMERA = "scene"
-_WORD, _TAKEN = re.compile("[a-z][a-z0-9_]*"), ("apart", "arm", "base", "ee", "joint", "pair", "tool")
+_WORD = re.compile("[a-z][a-z0-9_]*")
+_TAKEN = ("apart", "arm", "base", "ee", "joint", "pair", "tool", "torso")
 _KINDS: tuple[ShapeKind, ...] = ("box", "capsule", "cylinder", "sphere")
 
 

@@ -66,7 +66,7 @@ class RobotModel:
         """Return the model of the same robot that means another hand; the first one where it has no name."""
         names = [hand.name for hand in self.description.hands]
         if name and name not in names:
-            raise unknown_name("hand", name, names)
+            raise unknown_name("hand", name, [each or "'' (it has one hand)" for each in names])
         return _of_hand(self, names.index(name) if name else 0)
 
     def frame_id(self, frame: str) -> int:
@@ -175,7 +175,20 @@ def _build(description: RobotDescription) -> pin.Model:
         )
     for hand in description.hands:
         _add_tool(model, hand, description.name)
+    _check_hands(model, description)
     return model
+
+
+def _check_hands(model: pin.Model, description: RobotDescription) -> None:
+    """Check that each hand has a joint that moves no other: no two on one link, none on the base."""
+    ends = [model.frames[model.getFrameId(hand.named("tool"))].parentJoint for hand in description.hands]
+    chains = [set(model.supports[end]) - set(range(len(description.base.joints) + 1)) for end in ends]
+    for hand, own in zip(description.hands, chains, strict=True):
+        if not own.difference(*(other for other in chains if other is not own)):
+            raise HandrailError(
+                f"hand {hand.name!r} of robot {description.name}: expected a frame with a joint that moves "
+                f"no other hand, got {hand.frame!r}"
+            )
 
 
 def read_urdf(arm: Arm, mimic: bool = False) -> pin.Model:

@@ -168,7 +168,14 @@ TEXT = ROBOTS.find("tiago_pro").file.read_text()
         ('name = "right"', 'name = "left"', "hand: name: expected each once, got 'left' twice"),
         ('name = "right"', 'name = ""', "a name such as left of each of several"),
         ('name = "right"', 'name = "pair"', "a name such as left of each of several"),
+        ('name = "right"', 'name = "torso"', "a name such as left of each of several"),
         ('frame = "arm_right_tool_link"', 'frame = "arm_third_tool_link"', "arm_third_tool_link"),
+        (
+            'frame = "arm_right_tool_link"',
+            'frame = "arm_left_tool_link"',
+            "hand 'left' .* moves no other hand",
+        ),
+        ('frame = "arm_right_tool_link"', 'frame = "planar_base"', "hand 'right' .* moves no other hand"),
     ],
 )
 def test_hands_that_make_no_sense_are_refused(tmp_path, old, new, told):

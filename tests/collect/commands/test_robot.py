@@ -1,5 +1,6 @@
 """`handrail-robot`: what it says, what it draws, and the page's commands for xArm7, Kinova and PR2."""
 
+import re
 from pathlib import Path
 
 import matplotlib.image
@@ -57,10 +58,23 @@ def test_what_is_wrong_ends_with_1(tmp_path):
     assert done.stdout.count("\n") == 1
 
 
+@pytest.mark.parametrize("part", ["hand.gripper", "camera"])
+def test_a_frame_that_is_not_there_is_wrong_wherever_it_is_named(part, tmp_path):
+    path, text = tmp_path / "robot.toml", ROBOTS["lekiwi"].file.read_text()
+    before, mark, after = text.partition(f"[{part}]")
+    path.write_text(before + mark + re.sub('frame = ".*"', 'frame = "nowhere"', after, count=1))
+    done = command(path, name="robot check")
+    assert (done.returncode, done.stdout.count("\n")) == (1, 1), done.stderr
+    assert done.stdout.startswith("frame 'nowhere' of robot lekiwi: expected one of")
+
+
 REFUSED = {
     "no hand": ((XARM,), "--hands: expected the link at the end of the hand, such as one of link_eef"),
     "another link": ((XARM, "--hands", "hand"), "--hands hand: expected a link of"),
     "two without names": ((XARM, "--hands", "link7,left=link_eef"), "expected NAME=LINK of each"),
+    "two of one name": ((XARM, "--hands", "a=link7,a=link_eef"), "expected NAME=LINK of each"),
+    "two on one link": ((XARM, "--hands", "a=link_eef,b=link_eef"), "a joint that moves no other hand"),
+    "neither has a name": ((XARM, "--hands", "link7,link_eef"), "expected NAME=LINK of each"),
     "another joint": ((XARM, "--hands", "link_eef", "--joints", "neck"), "--joints neck: expected one of"),
     "no urdf": (("nothing.urdf", "--hands", "hand"), "URDF nothing.urdf: expected it beside"),
 }

@@ -17,6 +17,7 @@ from handrail.collect.world.observation import from_numbers, to_numbers
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import load_model
 
 ROBOT = "tiago_pro"
 TOOLS = ("left.tool", "right.tool")
@@ -118,3 +119,11 @@ def test_a_mode_of_two_hands_is_only_for_robots_that_have_them():
 def test_a_hand_that_is_not_there_is_refused_in_a_line():
     with pytest.raises(HandrailError, match="unknown hand 'third': expected one of left, right"):
         build_env(SessionConfig(robot=ROBOT, hand="third"), 20)
+    with pytest.raises(HandrailError, match=r"unknown hand 'left': expected one of '' \(it has one hand\)"):
+        build_env(SessionConfig(robot="lekiwi", hand="left"), 20)
+
+
+def test_a_mode_of_channels_that_a_robot_lacks_is_refused_before_anything_is_written():
+    told = "mode hand\\+torso: expected a robot with channels torso, got bi_so101"
+    with pytest.raises(HandrailError, match=told):
+        build_mode(SessionConfig(mode="hand+torso"), load_model("bi_so101"))
