@@ -136,11 +136,8 @@ def scripted_operator(
     model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
 ) -> ScriptedOperator:
     """Return who does a task's script in a mode, as brisk as people are with its device."""
-    if task.refuses(mode.groups("hand")):
-        raise HandrailError(
-            f"mode {mode.name}: expected each hand steered by itself, as in mode both, for task {task.name}; "
-            f"got both hands as one"
-        )
+    if refused := task.refuses(mode.groups("hand")):
+        raise HandrailError(f"mode {mode.name}: the script of task {task.name} expected {refused}")
     gains = gains_of(model, mode, human)
     drives = DEVICES.find(mode.device).drives or mode.by_focus
     script = resolved(task.script)(model, gains, drives=drives)

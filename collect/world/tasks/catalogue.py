@@ -1,6 +1,6 @@
 """The tasks by name; light to import."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -29,9 +29,12 @@ class TaskSpec:
     large: bool = False  # whether its furniture comes in one size, for robots whose world has scale 1
     parts: bool = False  # whether its hands go ways of their own
 
-    def refuses(self, groups: Iterable[str]) -> bool:
-        """Return whether channel groups of a mode move the hands as one, which go ways of their own."""
-        return self.parts and any(group.startswith("pair") for group in groups)
+    def refuses(self, groups: Sequence[str]) -> str:
+        """Return how hands are to be steered, and how a mode's channel groups do; nothing if they fit."""
+        if self.parts and any(group.startswith("pair") for group in groups):
+            return "each hand steered by itself, as in mode both; got both hands as one"
+        single = all(group in ("base", "hand", "torso") or group.startswith("ee.") for group in groups)
+        return "both hands steered, as in mode both; got one at most" if self.hands > 1 and single else ""
 
     def lacks(self, robot: "RobotDescription") -> str:
         """Return what a robot would need for it, and what it has; nothing of one that can do it."""

@@ -93,5 +93,13 @@ def test_a_small_robot_is_refused_in_a_line(task):
 @pytest.mark.parametrize("task", ["hand_over", "fetch", "reach_both"])
 def test_hands_that_move_as_one_cannot_take_turns(task):
     config = SessionConfig(task=task, mode="pair", robot=ROBOT)
-    with pytest.raises(HandrailError, match=f"mode pair: .* as in mode both, for task {task}"):
+    with pytest.raises(HandrailError, match=f"mode pair: the script of task {task} expected .* mode both"):
+        build_session(config, build_env(config, 20))
+
+
+@pytest.mark.parametrize("mode", ["ee", "hand+torso", "switching"])
+@pytest.mark.parametrize("task", ["carry_box", "wide_tray", "hand_over", "fetch", "reach_both"])
+def test_one_hand_cannot_do_what_takes_two(task, mode):
+    config = SessionConfig(task=task, mode=mode, robot=ROBOT)
+    with pytest.raises(HandrailError, match="expected both hands steered, as in mode both; got one"):
         build_session(config, build_env(config, 20))
