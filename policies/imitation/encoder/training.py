@@ -118,6 +118,8 @@ class _Training:
             self._draft.unlink(missing_ok=True)
         if self._draft.is_file():
             self._load()
+        elif config.file.exists() and not config.overwrite:
+            raise HandrailError(f"{str(config.file)!r}: no {self._draft.name} to go on from; say --overwrite")
 
     @property
     def encoder(self) -> Encoder:

@@ -84,8 +84,9 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     settings = check_policy_folder(place)
     where = f"--policy {place}"
     meta = read_meta(place) if (place / NAME).is_file() else _plain(place, settings, config)
-    if config.task and meta.environment in TASKS and meta.environment != config.task:
-        raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
+    for asked, own, known in ((config.task, meta.environment, TASKS), (config.robot, meta.robot, ROBOTS)):
+        if asked and own in known and own != asked:
+            raise HandrailError(f"{where}: expected one trained for {asked}, got {own!r}")
     TASKS.admit(meta.environment, (config.task,))  # before anything that a policy names is imported
     MODES.admit(meta.mode, (config.mode,))
     ROBOTS.admit(meta.robot, (config.robot,))

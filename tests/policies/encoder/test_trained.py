@@ -189,6 +189,14 @@ def test_other_pictures_are_shown(looking, tmp_path):
     assert json.loads((tmp_path / "e.json").read_text())["arms"].keys() == arms.keys()
 
 
+@pytest.mark.parametrize("asked", [{"robot": "lekiwi"}, {"robot": "moved.toml"}, {"task": "pick_place"}])
+def test_a_policy_that_says_its_robot_and_task_drives_no_other(looking, asked):
+    """It would be measured on its own instead, and nobody would know."""
+    (said,) = asked.values()
+    with pytest.raises(HandrailError, match=f"expected one trained for {said}, got"):
+        read_checkpoint(looking[2], EvaluateConfig(**asked))
+
+
 def test_saliency_is_where_the_thing_is():
     """With a network that looks at one place only, that place is red."""
     drawn = Drawn(EncoderConfig(image_size=SIZE))
@@ -211,3 +219,15 @@ def test_a_draft_of_something_else_is_refused(tmp_path):
     torch.save({"a": 1}, settings.file.with_suffix(".training"))
     with pytest.raises(HandrailError, match="say --overwrite"):
         train(settings)
+
+
+def test_an_encoder_that_is_there_is_never_replaced_unasked(tmp_path):
+    settings = config(tmp_path, updates=1)
+    train(settings)
+    settings.file.with_suffix(".training").unlink()
+    kept = settings.file.read_bytes()
+    with pytest.raises(HandrailError, match=r"no e\.training to go on from; say --overwrite"):
+        train(settings)
+    assert settings.file.read_bytes() == kept
+    train(dataclasses.replace(settings, overwrite=True, seed=1))
+    assert settings.file.read_bytes() != kept
