@@ -91,4 +91,8 @@ def main(*files):
         print(f"{names[k]}: {found[k]:+.2f} ({low[k]:+.2f} to {high[k]:+.2f}), p over all metrics {p:.3f}")
 
 
+if missing := [name for name in sys.argv[1:] if not Path(name).is_file()]:
+    sys.exit(f"expected files, got {', '.join(missing)}")
+if len(sys.argv) < 2:
+    sys.exit("expected STUDY.json …")
 main(*sys.argv[1:])

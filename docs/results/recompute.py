@@ -11,6 +11,7 @@ import sys
 import tarfile
 import tomllib
 from collections import defaultdict
+from pathlib import Path
 
 import numpy as np
 from scipy import stats
@@ -87,4 +88,8 @@ def main(archive, preset):
         print(f"{line}, p {p:.6f}, after Holm {holm:.6f}")
 
 
+if missing := [name for name in sys.argv[1:] if not Path(name).is_file()]:
+    sys.exit(f"expected files, got {', '.join(missing)}")
+if len(sys.argv) != 3:
+    sys.exit("expected ARCHIVE.tar.xz DESIGN.toml")
 main(*sys.argv[1:])

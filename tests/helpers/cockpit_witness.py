@@ -25,6 +25,12 @@ class Witness:
         self._socket, self._wants = None, False
         threading.Thread(target=self._watch, daemon=True).start()
 
+    def make_ready(self):
+        """Wait until the robot may be started; end what a law that failed has left."""
+        if self.until(bool)["phase"] != "ready":
+            self.end_episode()
+        self.until(lambda frame: frame["phase"] == "ready")
+
     def _watch(self):
         while not self._ends:
             with (

@@ -56,9 +56,7 @@ def recording(tmp_path_factory):
 @pytest.fixture
 def witness(recording):
     with closing(Witness(recording.address)) as made:
-        if made.until(bool)["phase"] != "ready":  # after a law that failed
-            made.end_episode()
-        made.until(lambda frame: frame["phase"] == "ready")
+        made.make_ready()
         yield made
 
 

@@ -38,9 +38,7 @@ def beside(tmp_path_factory, policy):
 @pytest.fixture
 def witness(beside):
     with closing(Witness(beside.address)) as made:
-        if made.until(bool)["phase"] != "ready":  # after a law that failed
-            made.end_episode()
-        made.until(lambda frame: frame["phase"] == "ready")
+        made.make_ready()
         yield made
 
 
