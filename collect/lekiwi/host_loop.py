@@ -70,7 +70,7 @@ class LeKiwiLoop:
         self._commands: Wire[bytes] = Wire(config.latency, config.drop, rng)
         self._answers: Wire[list[bytes]] = Wire(config.latency, config.drop, rng)
         self._heard = self._began = start
-        self._stopped, self._episode = False, 0.0
+        self._stopped, self._episode, self._newest = False, 0.0, b""
         self._pictures: dict[str, bytes] = {}
         self._painted = -math.inf
         self.malformed = self.stops = 0
@@ -124,6 +124,9 @@ class LeKiwiLoop:
             self.malformed += 1
             return
         self._heard, self._stopped = now, False
+        if message == self._newest:  # said once more
+            return
+        self._newest = message
         self._times.append(now)
         if math.isfinite(age := wall - number(command, SENT)):
             self._ages.append(age)

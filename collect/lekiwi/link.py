@@ -39,8 +39,9 @@ def _explained(what: str) -> Iterator[None]:
 class Link:
     """Keeps the beat: a command is sent, the period passes, the robot is heard.
 
-    A LeKiwi goes on as it was told last, for half a second. So while the next command is late, a thread sends
-    it the full stop, period by period.
+    A LeKiwi goes on as it was told last, for half a second. So every command is sent twice, half a period
+    apart: one lost message does not make it go on. And while the next command is late, a thread sends it the
+    full stop, period by period.
 
     Args:
         client: a robot of LeRobot's, not connected.
@@ -105,7 +106,10 @@ class Link:
         with _explained(f"robot {self._name}: cannot be reached"), self._lock:
             self._send(command)
         sent = self.body.sent
-        self._wait()
+        self._wait(0.5)
+        with _explained(f"robot {self._name}: cannot be reached"), self._lock:
+            self._client.send_action(self._action)
+        self._wait(0.5)
         self._listen()
         return sent
 
@@ -138,10 +142,10 @@ class Link:
             _log.warning("robot %s: commands were late; it braked for %d periods", self._name, self.late)
 
     def _send(self, command: ArrayLike) -> None:
-        action = {**self.body.send(command), **self._extras}
+        self._action = {**self.body.send(command), **self._extras}
         if self._simulated:
-            action[SENT] = time.time()
-        self._client.send_action(action)
+            self._action[SENT] = time.time()
+        self._client.send_action(self._action)
         self._sent_at = self._clock()
 
     def _watch(self) -> None:
@@ -150,8 +154,8 @@ class Link:
             with contextlib.suppress(Exception):
                 self.brake_if_late()
 
-    def _wait(self) -> None:
-        self._deadline += self.period
+    def _wait(self, periods: float) -> None:
+        self._deadline += periods * self.period
         ahead = self._deadline - self._clock()
         if ahead > 0.0:
             self._sleep(ahead)
