@@ -8,8 +8,9 @@ policy drives ──────────────────────
 ```
 After Chiou, Hawes, Stolkin, *Mixed-Initiative variable autonomy for remotely operated mobile robots* (arXiv
 1911.04848), and Panagopoulos et al., *A Hierarchical Variable Autonomy Mixed-Initiative Framework for
-Human-Robot Teaming in Mobile Robotics* (arXiv 2211.14095), as their abstracts describe them. Theirs is a
-mobile base with a path planner as the expert; here the expert is the policy, on whatever channels it owns.
+Human-Robot Teaming in Mobile Robotics* (arXiv 2211.14095), as their abstracts and their published program
+(uob-erl/fuzzy_mi_controller) have them. Theirs is a mobile base with a path planner as the expert; here the
+expert is the policy, on whatever channels it owns. docs/takeover.md says what else differs.
 """
 
 from collections.abc import Sequence
