@@ -175,7 +175,8 @@ def _equivalent(found: Contrast, asked: Declared) -> str:
 
 
 def _told(each: Contrast) -> str:
-    return sentence(each, f"{each.label[:1].upper()}{each.label[1:]}")
+    in_words = each.label in WORDS.values()  # else it begins with the name of a mode
+    return sentence(each, f"{each.label[:1].upper()}{each.label[1:]}" if in_words else each.label)
 
 
 def cautions(results: Results) -> dict[str, object]:

@@ -151,7 +151,7 @@ def test_pairs_that_are_declared_are_tested_and_no_others(gathered):
         (each.label, each.scope) for each in found if each.family == EXPLORATORY
     }
     said = answer(found, design)
-    assert said[0].startswith("Ee − decoupled")
+    assert said[0].startswith("ee − decoupled")
     assert "Equivalence of ee − decoupled within 10 points: not shown" in said[-1]
     like = gathered(design, shares=dict.fromkeys(SHARES, (0.95, 0.9, 1.0, 0.9)))
     assert "within 10 points: shown, p 0.0" in answer(contrasts(like), design)[-1]
