@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+import tarfile
 
 import numpy as np
 import pytest
@@ -61,3 +62,28 @@ def test_the_metric_that_goes_with_success_is_named_first(tmp_path):
     assert count == "1 groups, 12 policies"
     assert first.startswith("telling: -1.00 (-1.00 to -1.00), p ")
     assert other.startswith("other: ")
+
+
+def test_a_mode_that_needs_twice_the_minutes_is_said_to(tmp_path):
+    rng = np.random.default_rng(0)
+    for mode, factor in (("quick", 1.0), ("slow", 2.0)):
+        for draw in range(4):
+            for minutes in (3, 5, 10, 20):
+                share = 1 / (1 + (6.0 * factor / minutes) ** 2)
+                rollouts = [{"success": bool(rng.random() < share)} for _ in range(200)]
+                learnt = {"operator_time": 60.0 * minutes, "episodes": 12.0 * minutes / factor}
+                file = tmp_path / f"evaluations/reach/{mode}/{draw}/nominal/realised-time-{minutes}.json"
+                file.parent.mkdir(parents=True, exist_ok=True)
+                arms = {mode: [{"trained_on": learnt, "rollouts": rollouts}]}
+                file.write_text(json.dumps({"arms": arms}))
+    archive = tmp_path / "study.tar.xz"
+    with tarfile.open(archive, "w:xz") as file:
+        file.add(tmp_path / "evaluations", "evaluations")
+    script = [sys.executable, RESULTS / "minutes.py", archive, "quick", "slow"]
+    done = subprocess.run(script, capture_output=True, text=True, check=True)
+    said = re.findall(r"reach, (\w+): slow / quick (\S+) \((\S+) to (\S+)\), 4 draws", done.stdout)
+    ratios = {name: [float(each) for each in numbers] for name, *numbers in said}
+    for name, true in (("minutes", 2.0), ("demonstrations", 1.0)):
+        ratio, low, high = ratios[name]
+        assert low < true < high
+        assert ratio == pytest.approx(true, rel=0.15)
