@@ -22,6 +22,7 @@ CAPTIONS = {
     "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
     "robustness": "Success disturbed and undisturbed.",
     "updates": "Success after more and more updates: the mean over draws, and 95 %.",
+    "amounts": "Success against the operator's minutes: the mean over draws, and 95 %.",
 }
 
 
@@ -42,7 +43,9 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     if disturbed:
         made["robustness"] = _robustness(disturbed, results)
     if tasks and results.progress.design.curve:
-        made["updates"] = _updates(tasks, results)
+        made["updates"] = _grown(tasks, results, "updates [thousand]")
+    if sized := [task for task in tasks if results.progress.design.tasks[task].sizes]:
+        made["amounts"] = _grown(sized, results, "operator's time [min]")
     return made
 
 
@@ -146,26 +149,35 @@ def _training(tasks: Sequence[str], results: Results) -> Any:
     return figure
 
 
-def _updates(tasks: Sequence[str], results: Results) -> Any:
-    """One panel a task: success of the policies of joint velocities over the updates that they had."""
+def _grown(tasks: Sequence[str], results: Results, over: str) -> Any:
+    """One panel a task: success of the policies of joint velocities over their updates, or their data."""
     design = results.progress.design
     figure, panels = _panels(tasks, 3.2, sharey=True)
     for axes, task in panels:
-        steps = {after(updates): updates for updates in design.curve} | {"": design.tasks[task].steps}
-        for mode in design.modes:
-            shown = {name: found for name in steps if (found := results.find(task, mode, name))}
+        sizes = design.tasks[task]
+        places = {("", after(updates)): updates / 1000 for updates in design.curve}
+        every = sizes.steps / 1000
+        if "updates" not in over:
+            places, every = {(f" {size:g} min", ""): size for size in sizes.sizes}, sizes.minutes
+        for place, mode in enumerate(design.modes):
+            shown = {
+                at: found
+                for (more, treatment), at in [*places.items(), (("", ""), every)]
+                if (found := results.find(task, f"{mode}{more}", treatment))
+            }
             values = np.array(
                 [[found.value.estimate, *(found.value.interval or ())] for found in shown.values()]
             )
             if not shown:
                 continue
-            style = _style(next(iter(shown.values())), results) | {"elinewidth": 1.2, "ms": 5}
+            style = _style(next(iter(shown.values())), results) | {"label": mode, "elinewidth": 1.2, "ms": 5}
             errors = np.abs(values[:, 1:] - values[:, :1]).T * 100
-            axes.errorbar([steps[name] / 1000 for name in shown], 100 * values[:, 0], yerr=errors, **style)
-        axes.set(xlabel="updates [thousand]", ylim=(-3, 103))
-        axes.legend(fontsize=8, frameon=False)
+            shift = 0.006 * (place - 0.5 * (len(design.modes) - 1)) * every  # intervals lie side by side
+            axes.errorbar(np.array([*shown]) + shift, 100 * values[:, 0], yerr=errors, **style)
+        axes.set(xlabel=over, ylim=(-3, 103))
         tidy(axes)
     figure.axes[0].set_ylabel("policy success [%], 95 %")
+    figure.axes[-1].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
