@@ -15,7 +15,7 @@ from handrail.controllers.numerics.rotation import rotation_vector
 from handrail.controllers.robot.model import Pose
 from handrail.controllers.robot.shape import Obstacle
 
-SHARE = 0.5  # α, the actor's
+SHARE = 0.5  # α of an actor that wants to go the operator's way
 _GAIN = 1.2  # k, of the way to go [1/s]
 _SPEED, _RATE = 0.35, 0.6  # of the actor at most, at scale 1 [m/s, rad/s]
 
@@ -25,8 +25,10 @@ class BlendedMpc(MaskedMpc):
 
     û is the operator's command; ĉ is the actor's, that leads the hand to its goal: `v̂ = k (p* - p)` and
     `ω̂ = k log(R* Rᵀ)`, their norms bounded. It acts on what the operator commands of that hand, and only
-    while they move it: let go, the robot stands still. Without a goal it is the masked MPC. After the blended
-    control that the paper cites as [9]; there the actor is a planner.
+    while they move it: let go, the robot stands still. Of translation and of turns by themselves,
+    `α = ½ max(0, û·ĉ / ‖û‖ ‖ĉ‖)`: the actor helps as far as both want the same. Without a goal it is the
+    masked MPC. After the blended control that the paper cites as [9], where the actor is a planner; that α
+    goes by agreement is after Dragan, Srinivasa, *A policy-blending formalism for shared control* (2013).
     """
 
     _goal: Pose | None = None
@@ -54,12 +56,15 @@ class BlendedMpc(MaskedMpc):
         operator = in_usual_frames(intent, self.model, state.q)
         if operator is None:
             return intent
-        mask, values = np.zeros_like(intent.mask), np.zeros(self.channels.size)
+        mask, values, share = (np.zeros_like(each) for each in (intent.mask, intent.values, intent.values))
         mask[hand], values[hand] = intent.mask[hand], self._wanted(self._goal, state.q)
-        actor = replace(operator, values=values, mask=mask)
+        for part in (slice(hand.start, hand.start + 3), slice(hand.start + 3, hand.stop)):
+            asked = np.where(operator.mask, operator.values, 0.0)[part]
+            lengths = float(np.linalg.norm(asked) * np.linalg.norm(values[part]))
+            share[part] = SHARE * max(0.0, float(asked @ values[part]) / max(lengths, 1e-9))
         sources = (
-            IntentSource("operator", operator, np.where(mask, 1.0 - SHARE, 1.0)),
-            IntentSource("actor", actor, SHARE),
+            IntentSource("operator", operator, np.where(mask, 1.0 - share, 1.0)),
+            IntentSource("actor", replace(operator, values=values, mask=mask), share),
         )
         return Intents.of(sources, intent.grippers, operator)
 

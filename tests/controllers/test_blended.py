@@ -24,14 +24,16 @@ def driven(values, steps, goal=AHEAD, controller=None):
     return roll(blend, [asking(values, "ee")] * steps)
 
 
-def test_the_hand_goes_the_weighted_mean_of_both_ways():
-    q, v, commands = driven(ASIDE, 20)
+@pytest.mark.parametrize("angle", [0.0, 0.5, 1.0, 1.4, 2.0, 3.1])
+def test_the_hand_goes_the_weighted_mean_of_both_ways(angle):
+    """The farther apart both ways are, the less the actor counts; from a right angle on nothing."""
+    asked = 0.1 * np.array([np.cos(angle), np.sin(angle)])
+    q, v, commands = driven(NOTHING | dict(zip(list(ASIDE)[:2], asked, strict=True)), 12)
     assert {each.diagnostics.status for each in commands} == {Status.OK}
-    way = AHEAD.position - MODEL.pose(q[-1]).position
-    actor = 1.2 * way[:2]  # k (p* − p), below its bound
-    expected = (1.0 - SHARE) * np.array([0.0, 0.1]) + SHARE * actor
-    np.testing.assert_allclose((MODEL.jacobian(q[-1]) @ v[-1])[:2], expected, atol=0.02)
-    assert expected[0] > 0.05  # the actor leads where the operator does not push
+    actor = 1.2 * (AHEAD.position - MODEL.pose(q[-1]).position)[:2]  # k (p* − p), below its bound
+    share = SHARE * max(0.0, asked @ actor / np.linalg.norm(asked) / np.linalg.norm(actor))
+    expected = (1.0 - share) * asked + share * actor
+    np.testing.assert_allclose((MODEL.jacobian(q[-1]) @ v[-1])[:2], expected, atol=0.015)
 
 
 def test_an_operator_who_pushes_roughly_is_led_to_the_goal():
@@ -42,7 +44,7 @@ def test_an_operator_who_pushes_roughly_is_led_to_the_goal():
         q, *_ = driven(rough, 60, AHEAD if isinstance(controller, BlendedMpc) else None, controller)
         places = np.array([MODEL.pose(each).position for each in q])
         left[type(controller)] = np.linalg.norm(places - AHEAD.position, axis=1).min()
-    assert left[BlendedMpc] < 0.6 * left[MaskedMpc]
+    assert left[BlendedMpc] < 0.8 * left[MaskedMpc]
 
 
 def test_let_go_the_robot_stands_whatever_the_actor_wants():
