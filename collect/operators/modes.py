@@ -170,7 +170,7 @@ MODES = Registry(
             "blended",
             always("hand"),
             "blended",
-            "steer the hand; an actor that knows the goal weighs as much, while you move",
+            "steer the hand; an actor that knows the goal helps as far as both want the same",
         ),
         TeleopMode(
             "ee_dls_base",
