@@ -24,8 +24,9 @@ class PolicyConfig:
     arbitration: Advanced[ArbiterSettings] = field(default_factory=ArbiterSettings)
 
     def check_policy(self, operator: str) -> None:
-        """Check that there is a policy where an operator is there to supervise one."""
+        """Check that there is a policy to supervise, and an ensemble where its doubt decides."""
         ARBITERS.check(self.arbiter)
         if operator in _SUPERVISORS and not self.policy:
-            words = "expected --policy, the folder of one to supervise"
-            raise HandrailError(f"--operator {operator}: {words}")
+            raise HandrailError(f"--operator {operator}: expected --policy, the folder of one to supervise")
+        if self.arbiter == "risk" and len(self.policy) == 1:  # it never says how unsure it is
+            raise HandrailError("--arbiter risk: expected several folders after --policy, got 1")

@@ -21,7 +21,7 @@ from handrail.collect.operators.shared.settings import HANDBACK
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.intent import LONG_AGO, Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO, Intent
 from handrail.controllers.interface.sources import PERSON, POLICY, Intents, IntentSource, Preview
 from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.robot.model import RobotModel
@@ -88,11 +88,10 @@ class SharedOperator:
         return self._merged(person, wanted, view)
 
     def _wanted(self, view: View) -> Intent | None:
-        """Return what the policy wants; None of an answer that no controller accepts."""
+        """Return what the policy wants; None of an answer that no controller accepts, or an old one."""
         wanted = self._policy.act(view).of_hands(self._hands)
-        if not (
-            wanted.values.shape == (self._channels.size,) and wanted.is_finite and wanted.frames.are_known
-        ):
+        fits = wanted.values.shape == (self._channels.size,) and wanted.is_finite and wanted.frames.are_known
+        if not fits or view.state.time - wanted.time > DEAD_MAN_TIME:
             return None
         return in_usual_frames(wanted, self._model, view.state.q)
 

@@ -10,6 +10,7 @@ from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.scripted import ScriptedOperator, scripted_operator
 from handrail.collect.operators.scripted.steering import Target, pose_errors
 from handrail.collect.world.tasks.catalogue import TaskSpec
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.robot.model import RobotModel
 
@@ -91,6 +92,9 @@ def hand_supervisor(
     """Return who supervises as `supervisor`, but leaves the base to the policy whatever the mode owns."""
 
     def groups(focus: Focus) -> tuple[str, ...]:
-        return tuple(group for group in mode.groups(focus) if group != "base")
+        return tuple(name for name in mode.groups(focus) if name.split(".")[0] not in ("base", "joint"))
 
+    if not (groups("hand") and groups("base")):
+        words = "expected a mode that steers a hand throughout, such as base+ee"
+        raise HandrailError(f"--operator hand_supervisor: {words}, got {mode.name}")
     return supervisor(model, replace(mode, groups=groups), task, human)

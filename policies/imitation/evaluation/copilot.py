@@ -70,7 +70,7 @@ def _fitting(checkpoint: Checkpoint, config: RecordConfig, env: HandrailEnv) -> 
     for name, own, here in (
         ("--task", meta.environment, config.task),
         ("--robot", meta.robot, config.robot),
-        ("--dataset.fps", meta.fps, env.fps),
+        ("--robot_fps" if config.robot_fps else "--dataset.fps", meta.fps, env.fps),
         ("--hand", meta.hand or env.model.hand.name, env.model.hand.name),
     ):
         if own != here:

@@ -60,14 +60,14 @@ class Hand:
     """A person whose stick is where the test put it."""
 
     def __init__(self, channels):
-        self.speed, self._channels = 0.0, channels
+        self.speed, self.channel, self._channels = 0.0, "ee.vy", channels
 
     def reset(self, view, rng):
         pass
 
     def act(self, view):
-        values = np.where(self._channels.mask("ee.vy"), self.speed, 0.0)
-        return Intent(values, self._channels.mask("ee"), mode="ee", time=view.state.time)
+        values = np.where(self._channels.mask(self.channel), self.speed, 0.0)
+        return Intent(values, self._channels.mask("base", "ee"), mode="ee", time=view.state.time)
 
 
 class Episode:
@@ -160,3 +160,17 @@ def test_after_the_last_period_of_its_plan_the_robot_brakes(episode):
     assert frames[-1].number == frame.number + 40
     assert all(each.diagnostics.status is Status.STALE_INTENT for each in frames[10:])
     np.testing.assert_allclose(frames[-1].action[:-1], 0.0, atol=1e-6)
+
+
+def test_the_person_drives_on_after_the_last_period_of_its_plan(episode):
+    """They move the base; the hand, which was the policy's, is nobody's then."""
+    late = episode(200)
+    late.until_policy()
+    late.hand.channel, late.hand.speed = "base.vx", 0.1
+    assert late.step()[1] == {PERSON, POLICY}
+    for _ in range(220):
+        frame, drivers = late.step()
+        assert frame.diagnostics.status is Status.OK
+    assert drivers == {PERSON}
+    assert frame.intent.source(POLICY) is None
+    assert np.any(np.abs(frame.action[:-1]) > 0.01)
