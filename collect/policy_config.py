@@ -28,5 +28,7 @@ class PolicyConfig:
         ARBITERS.check(self.arbiter)
         if operator in _SUPERVISORS and not self.policy:
             raise HandrailError(f"--operator {operator}: expected --policy, the folder of one to supervise")
+        if not self.policy and (self.arbiter, self.arbitration) != ("by_mask", ArbiterSettings()):
+            raise HandrailError("--arbiter, --arbitration: expected --policy too, found none to share with")
         if self.arbiter == "risk" and len(self.policy) == 1:  # it never says how unsure it is
             raise HandrailError("--arbiter risk: expected several folders after --policy, got 1")

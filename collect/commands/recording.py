@@ -1,9 +1,10 @@
 """A session whose episodes become a dataset: what `handrail-record` and a user study share."""
 
+import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -155,6 +156,10 @@ def session_columns(config: RecordConfig) -> dict[str, Scalar]:
     }
     if config.robot_client:
         columns[CLIENT] = config.robot_client + (" (simulated)" if config.client.simulated else "")
+    if config.policy:
+        names = [os.path.basename(each.rstrip("/")) for each in config.policy]
+        shared = {"arbiter": config.arbiter, "policies": names} | asdict(config.arbitration)
+        columns["shared"] = json.dumps(shared)
     return columns
 
 

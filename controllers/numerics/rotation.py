@@ -57,13 +57,6 @@ def quaternion_from_matrix(matrix: ArrayLike) -> FloatArray:
     return quaternion if w >= 0 else -quaternion
 
 
-def matrix_from_quaternion(quaternion: ArrayLike) -> FloatArray:
-    """Return the rotation matrix of a quaternion (w, x, y, z), (3, 3): `I + 2 w [r]× + 2 [r]×²`, |q| = 1."""
-    w, *r = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
-    cross = _cross_matrix(*r)
-    return _NO_TURN + 2.0 * w * cross + 2.0 * cross @ cross
-
-
 def matrix_from_vector(vector: ArrayLike) -> FloatArray:
     """Return the rotation matrix of a rotation vector θ a [rad], (3, 3).
 

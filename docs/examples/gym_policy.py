@@ -5,18 +5,19 @@ python docs/examples/gym_policy.py
 
 import gymnasium
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import handrail.collect  # noqa: F401  (registers the environments)
 from handrail.controllers import Intent, MaskedMpc
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.numerics.rotation import matrix_from_quaternion, rotation_vector
 
 
 def policy(observation: dict[str, FloatArray]) -> FloatArray:
     """Return the hand's twist (v, ω): straight to the goal, and no faster than a careful person, (6,)."""
     tool, goal = observation["agent_pos"][-7:], observation["environment_state"][:7]  # position, wxyz
     away = goal[:3] - tool[:3]
-    turn = rotation_vector(matrix_from_quaternion(goal[3:]) @ matrix_from_quaternion(tool[3:]).T)
+    wanted, now = (Rotation.from_quat(each[3:], scalar_first=True) for each in (goal, tool))
+    turn = (wanted * now.inv()).as_rotvec()
     return np.concatenate([shortened(1.5 * away, 0.3), shortened(1.5 * turn, 0.6)])
 
 

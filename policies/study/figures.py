@@ -155,8 +155,7 @@ def _grown(tasks: Sequence[str], results: Results, over: str) -> Any:
     figure, panels = _panels(tasks, 3.2, sharey=True)
     for axes, task in panels:
         sizes = design.tasks[task]
-        places = {("", after(updates)): updates / 1000 for updates in design.curve}
-        every = sizes.steps / 1000
+        places, every = {("", after(each)): each / 1000 for each in design.curve}, sizes.steps / 1000
         if "updates" not in over:
             places, every = {(f" {size:g} min", ""): size for size in sizes.sizes}, sizes.minutes
         for place, mode in enumerate(design.modes):

@@ -153,9 +153,9 @@ def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
         return ["No draw has all that is declared on all tasks yet: nothing can be said."]
     if design.rounds:
         return [sentence(each, name, _sides(each)) for name, each in tested.items()]
-    told = [
-        _told(tested[name]) for name in dict.fromkeys([*reversed(WORDS.values()), *tested]) if name in tested
-    ]
+    names = [name for name in dict.fromkeys([*reversed(WORDS.values()), *tested]) if name in tested]
+    capitals = {name: f"{name[:1].upper()}{name[1:]}" for name in WORDS.values()}  # no names of modes
+    told = [sentence(tested[name], capitals.get(name, name)) for name in names]
     return told + [
         _equivalent(tested[each.label], each) for each in asked if each.margin and each.label in tested
     ]
@@ -172,11 +172,6 @@ def _equivalent(found: Contrast, asked: Declared) -> str:
     if p is not None and found.p_adjusted is not None:
         verdict = f"{'' if p < LEVEL else 'not '}shown, p {p:.2g}"
     return f"Equivalence of {asked.label} within {100 * asked.margin:g} points: {verdict}."
-
-
-def _told(each: Contrast) -> str:
-    in_words = each.label in WORDS.values()  # else it begins with the name of a mode
-    return sentence(each, f"{each.label[:1].upper()}{each.label[1:]}" if in_words else each.label)
 
 
 def cautions(results: Results) -> dict[str, object]:

@@ -1,6 +1,8 @@
 """Laws of who supervises a policy: what nobody could help with, or would never ask for help, is refused."""
 
+import json
 from contextlib import closing
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -8,7 +10,9 @@ import pytest
 from command_helpers import refused
 from policy_helpers import untrained_act
 
-from handrail.collect.config import SessionConfig
+from handrail.collect.commands.recording import session_columns
+from handrail.collect.config import RecordConfig, SessionConfig
+from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.collect.session.build import build_env, build_mode, build_operator
 from handrail.collect.session.loop import EpisodeLoop
 from handrail.controllers.baselines.direct import DirectController
@@ -16,6 +20,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 
 OPERATOR = "hand_supervisor"
+REAL = ("--task", "reach", "--robot", "lekiwi", "--robot_client", "lekiwi", "--policy", "one")
 WORDS = ("--task", "reach", "--no_physics", "--operator", "supervisor")
 
 
@@ -45,8 +50,29 @@ def test_a_mode_that_does_not_steer_the_hand_throughout_is_refused(env, mode):
         supervisor(env, mode=mode)
 
 
-def test_one_policy_is_no_ensemble_whose_doubt_could_ask_for_help(tmp_path):
-    refused(tmp_path, *WORDS, "--policy", "one", "--arbiter", "risk", told="--arbiter risk: expected several")
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        ((*WORDS, "--policy", "one", "--arbiter", "risk"), "--arbiter risk: expected several folders"),
+        (("--task", "reach", "--arbiter", "whole"), "--arbiter, --arbitration: expected --policy too"),
+        (
+            ("--task", "reach", "--arbitration.alpha", "0.4"),
+            "--arbiter, --arbitration: expected --policy too",
+        ),
+        ((*REAL, "--operator", "supervisor"), "--operator supervisor: expected a person beside a policy"),
+        ((*REAL, "--operator", "scripted"), "--operator scripted: expected a person beside a policy"),
+    ],
+)
+def test_what_nobody_could_supervise_is_refused(tmp_path, flags, told):
+    refused(tmp_path / "set", *flags, told=told)
+
+
+def test_an_episode_says_who_shared_it():
+    settings = ArbiterSettings(alpha=0.3)
+    config = RecordConfig(policy=("outputs/first/", "b"), arbiter="blend", arbitration=settings)
+    said = json.loads(str(session_columns(config)["shared"]))
+    assert said == {"arbiter": "blend", "policies": ["first", "b"]} | asdict(settings)
+    assert "shared" not in session_columns(RecordConfig())
 
 
 def test_a_policy_of_another_rate_is_refused_by_the_flag_that_was_said(tmp_path):
