@@ -56,7 +56,7 @@ class BlendedMpc(MaskedMpc):
         operator = in_usual_frames(intent, self.model, state.q)
         if operator is None:
             return intent
-        mask, values, share = (np.zeros_like(each) for each in (intent.mask, intent.values, intent.values))
+        mask, (values, share) = np.zeros_like(intent.mask), np.zeros((2, self.channels.size))
         mask[hand], values[hand] = intent.mask[hand], self._wanted(self._goal, state.q)
         for part in (slice(hand.start, hand.start + 3), slice(hand.start + 3, hand.stop)):
             asked = np.where(operator.mask, operator.values, 0.0)[part]
