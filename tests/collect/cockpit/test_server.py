@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from cockpit_helpers import ask, drive, heard, page, seen, server, show, stage, told
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus
 
 from handrail.collect.cockpit.page_socket import REPLACED
 from handrail.collect.cockpit.pipe import Kind
@@ -180,8 +180,17 @@ def test_a_server_that_dies_is_started_again_at_its_address_and_a_session_outliv
         assert (made.address, len(said)) == (address, 1)
         assert made.process.pid != before
         stage(made)
-        with page(made, cookie=cookie) as socket:
+        with asked_again(made, cookie) as socket:
             told(socket, "stage")
+
+
+def asked_again(served, cookie):
+    """Open a socket as a page does whose server is just being started: it asks again."""
+    for _ in range(9):
+        with suppress(InvalidMessage, ConnectionError):
+            return page(served, cookie=cookie)
+        time.sleep(0.5)
+    return page(served, cookie=cookie)
 
 
 @pytest.mark.slow
