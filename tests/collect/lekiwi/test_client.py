@@ -137,6 +137,18 @@ def test_delays_touch_nothing(gap, latency, drop, seeds):
     assert gap or found[0][1] > 0.3  # a robot that never moves touches nothing, too
 
 
+def test_every_command_is_sent_twice_half_a_period_apart():
+    client = PlayedClient()
+    link = Link(client, "lekiwi", load_model("lekiwi"), 0.05, True, client.clock, client.sleep)
+    for speed in (0.01, 0.02):
+        client.sent.clear()
+        link.exchange([speed, 0, 0, 0, 0, 0, 0, 0, 0])
+        assert len(client.sent) == 2
+        assert client.sent[0] == client.sent[1]
+        assert client.sent[0]["x.vel"] == pytest.approx(speed, abs=1e-3)
+    link.close()
+
+
 def test_a_base_whose_next_command_is_late_is_sent_the_stop_and_that_is_said(caplog):
     client = FarClient(0.0, 0.0, 0)
     link = client.link = Link(client, "lekiwi", load_model("lekiwi"), 0.05, False, client.clock, client.sleep)
