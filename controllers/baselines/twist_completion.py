@@ -51,26 +51,6 @@ def damped_least_squares(matrix: FloatArray, values: FloatArray, inverse: FloatA
     return scaled @ np.linalg.solve(matrix @ scaled + np.eye(len(values)), values)
 
 
-def blended(operator: Completion, autonomy: Completion, share: float = 0.5) -> Completion:
-    """Return `v = α v_operator + (1 − α) v_autonomy`: the weighted mean of two rules.
-
-    Neither is an actor with a goal of its own, as in the blended control that the paper cites.
-    What both do with the hand passes whole, since a twist is linear in v; of what only one of them does with
-    it, its share passes. An actor that knows nothing of the hand thus takes 1 − α of the operator's command.
-
-    Args:
-        operator: completes what the operator asks for.
-        autonomy: what the autonomous actor does at the same time.
-        share: α, the operator's, from 0 to 1.
-    """
-
-    def blend(q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:
-        operated = operator(q, previous, twist, duration)
-        return share * operated + (1.0 - share) * autonomy(q, previous, twist, duration)
-
-    return blend
-
-
 class TwistController(ReactiveController):
     """Completes the tool's twist by a rule; other channels make it brake; a controller.
 

@@ -25,7 +25,7 @@ from handrail.controllers.baselines.arm_completion import (
     WeldedBaseCompletion,
     clamp_twist,
 )
-from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, blended, tool_twist
+from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, tool_twist
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -117,20 +117,6 @@ def test_a_long_twist_is_shortened_and_keeps_its_direction(twist):
         length = np.linalg.norm(twist[part])
         assert np.linalg.norm(clamped[part]) == pytest.approx(min(length, most))
         assert np.allclose(clamped[part] * length, twist[part] * np.linalg.norm(clamped[part]))
-
-
-@given(TWISTS, st.floats(0.0, 1.0))
-@QUICK
-def test_a_blend_gives_the_hand_what_both_give_it(twist, alpha):
-    """The twist of the blend is the weighted mean of the two twists; at the ends it is one of the two."""
-    parts = WholeBodyCompletion(MODEL), WeldedBaseCompletion(MODEL)
-    blend = blended(*parts, alpha)(HOME, REST, twist, STEP)
-    operator, autonomy = (part(HOME, REST, twist, STEP) for part in parts)
-    jacobian = MODEL.jacobian(HOME)
-    mean = alpha * jacobian @ operator + (1 - alpha) * jacobian @ autonomy
-    np.testing.assert_allclose(jacobian @ blend, mean, atol=1e-12)
-    if alpha in (0.0, 1.0):
-        np.testing.assert_allclose(blend, operator if alpha else autonomy, atol=1e-12)
 
 
 def test_a_base_that_follows_rests_when_nothing_is_asked():

@@ -9,11 +9,11 @@ from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import BaseFollowingCompletion, WeldedBaseCompletion
 from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
-from handrail.controllers.baselines.twist_completion import blended as blend
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Bounded, Prediction, Smoothed, after
+from handrail.controllers.mpc.blended import BlendedMpc
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
@@ -155,6 +155,5 @@ def base_following(model: RobotModel, period: float) -> Controller:
 
 
 def blended(model: RobotModel, period: float) -> Controller:
-    """Return the average of two completions."""
-    both = blend(WholeBodyCompletion(model), WeldedBaseCompletion(model))
-    return TwistController(model, both, period)
+    """Return `mpc_paper` with an actor that knows the goal and helps where both agree: mode `blended`."""
+    return BlendedMpc(model, paper_settings())

@@ -63,7 +63,7 @@ BASELINES = Registry(
         Baseline("dls", "damped least squares, whole body", _DLS),
         Baseline("dls_arm", "damped least squares on the arm, nominal base", f"{_HERE}:nominal_base"),
         Baseline("decoupled", "decoupled base and arm", f"{_HERE}:base_following"),
-        Baseline("blended", "the mean of dls and dls_arm", f"{_HERE}:blended"),
+        Baseline("blended", "mpc_paper and an actor", f"{_HERE}:blended", aims=True, period=0.09),
         Baseline("direct", "dls as joint commands, no controller", _DIRECT, _JOINTS),
         Baseline("cbf_filter", "CBF safety filter on joint commands", _CBF, _JOINTS),
         Baseline("safety_filter", "multi-step safety filter on joint commands", _FILTER, _JOINTS, 0.06),
