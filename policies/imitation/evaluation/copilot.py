@@ -14,7 +14,7 @@ from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.catalogue import ARBITERS
 from handrail.collect.operators.shared.planning import Ensemble, Planner, ThreadedPlanner
 from handrail.collect.operators.shared.shared_operator import SharedOperator
-from handrail.collect.session.build import build_mode
+from handrail.collect.session.build import build_mode, build_modes
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
@@ -40,7 +40,7 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
     """
     mode = build_mode(config, env.model)
     if not _is_completed(mode):
-        fit = ", ".join(name for name, each in MODES.items() if _is_completed(each))
+        fit = ", ".join(name for name, each in build_modes(config, env).items() if _is_completed(each))
         raise HandrailError(f"--mode {mode.name}: expected one that the MPC completes beside a policy: {fit}")
     asked = EvaluateConfig(
         task=config.task, robot=config.robot, mode="" if config.mask else config.mode, fps=round(env.fps)

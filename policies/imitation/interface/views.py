@@ -6,23 +6,23 @@ p = c + ρ R n                               of a camera at c with axes R; s = t
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 import torch
-from msgspec import Meta
 from torch import Tensor
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.parts import Camera
-from handrail.controllers.typed import AtLeastOne, Number
+from handrail.controllers.typed import AtLeastOne, Number, Positive
 from handrail.policies.imitation.interface.relative import RobotPose
 
 _FINEST = 2e-3  # how far something is off at least [m]
 _SPREAD = 4.0  # variance over σ², of a density ∝ e^(−|e| / σ) in space
 _RIGID = 1e-5  # [m, 1]
+_Place = tuple[Number, Number, Number]
 PLACED = 5  # numbers: u, v, log ρ, log σ_l, log σ_d
 
 
@@ -31,11 +31,11 @@ class CameraMount:
     """A camera that is fixed to the base or to the tool, and its pictures."""
 
     on: Literal["base", "tool"]
-    position: tuple[Number, Number, Number]
+    position: _Place
     """There [m]."""
-    axes: tuple[tuple[Number, Number, Number], ...]
+    axes: tuple[_Place, _Place, _Place]
     """Rows of the matrix whose columns are right, up and back."""
-    slope: Annotated[float, Meta(gt=0)]
+    slope: Positive
     """s."""
     size: tuple[AtLeastOne, AtLeastOne]
     """Height and width of the pictures [px]."""

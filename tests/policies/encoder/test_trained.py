@@ -50,6 +50,15 @@ def test_a_chunk_comes_from_its_number_alone(tmp_path):
     assert not np.array_equal(one["environment"][0], Drawn(config(tmp_path, seed=1))[1]["environment"][0])
 
 
+@pytest.mark.parametrize("wrong", [{"slope": float("inf")}, {"axes": ((1.0, 0.0, 0.0),) * 2}])
+def test_a_camera_that_cannot_be_is_refused(tmp_path, wrong):
+    reads, path = Drawn(config(tmp_path)).reads, tmp_path / "e.safetensors"
+    mounts = {name: dataclasses.replace(each, **wrong) for name, each in reads.cameras.items()}
+    Encoder(dataclasses.replace(reads, cameras=mounts)).save(path)
+    with pytest.raises(HandrailError, match=next(iter(wrong))):
+        Encoder.load(path)
+
+
 def test_cameras_come_in_the_order_that_is_asked_for(tmp_path):
     drawn = Drawn(config(tmp_path, cameras="wrist,front"))
     chunk, reads = drawn[0], drawn.reads

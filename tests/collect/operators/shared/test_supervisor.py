@@ -12,12 +12,14 @@ from policy_helpers import untrained_act
 
 from handrail.collect.commands.recording import session_columns
 from handrail.collect.config import RecordConfig, SessionConfig
+from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.shared.settings import ArbiterSettings
 from handrail.collect.session.build import build_env, build_mode, build_operator
 from handrail.collect.session.loop import EpisodeLoop
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
+from handrail.policies.imitation.evaluation.copilot import share
 
 OPERATOR = "hand_supervisor"
 REAL = ("--task", "reach", "--robot", "lekiwi", "--robot_client", "lekiwi", "--policy", "one")
@@ -65,6 +67,15 @@ def test_a_mode_that_does_not_steer_the_hand_throughout_is_refused(env, mode):
 )
 def test_what_nobody_could_supervise_is_refused(tmp_path, flags, told):
     refused(tmp_path / "set", *flags, told=told)
+
+
+def test_what_a_policy_may_stand_beside_is_said_of_this_robot(env):
+    """A mode of two hands is no choice of a robot with one."""
+    with pytest.raises(HandrailError, match="expected one that the MPC completes") as error:
+        share(RecordConfig(task="reach", mode="direct", policy=("none",)), supervisor(env), env)
+    choices = {MODES[name] for name in str(error.value).rpartition(": ")[2].split(", ")}
+    assert MODES["ee"] in choices
+    assert {mode.hands for mode in choices} == {1}
 
 
 def test_an_episode_says_who_shared_it():
