@@ -3,8 +3,9 @@
 `python docs/results/metrics.py STUDY.json …`. Spearman's ρ of a metric of a recording and the success of
 the policy that learnt from it, over modes and draws of a study, a task and an amount of data; ρ is the mean
 over these. Its interval: 95 % of ρ over modes drawn anew with their draws. p: how often some metric has a
-larger |ρ| where success is given to modes by chance, so that it holds for all metrics together. Explores:
-modes differ in more than one metric.
+larger |ρ| where success is given to modes by chance, so that it holds for all metrics together. Modes are
+chosen once for all groups: amounts of a task share recordings. Explores: modes differ in more than one
+metric, and m of them give no p below 1 / m!, nor a sure interval.
 """
 
 import json
@@ -19,7 +20,7 @@ TIMES = 2000
 
 
 def read(files):
-    """Return metrics, (modes, draws, metrics), and success, (modes, draws), of each group of policies."""
+    """Return metrics and success, draw by draw, of each mode of each group of policies."""
     found = defaultdict(dict)
     for file in files:
         study = json.loads(Path(file).read_text())
@@ -53,39 +54,24 @@ def main(*files):
     groups, rng = read(files), np.random.default_rng(0)
     every = [recorded for group in groups.values() for recorded, _ in group.values()]
     names = sorted(set.intersection(*(set(draw) for recorded in every for draw in recorded)))
-    tables = [
-        (
-            np.array(
-                [[[draw[name] for name in names] for draw in recorded] for recorded, _ in group.values()]
-            ),
-            np.array([success for _, success in group.values()]),
-        )
-        for group in groups.values()
-    ]
+    modes = sorted({mode for group in groups.values() for mode in group})
 
-    def mean(choose):
-        """Return each metric's ρ with the modes of each group that are chosen, for metric and success."""
-        chosen = [
-            (metrics[one], success[other])
-            for metrics, success in tables
-            for one, other in [choose(len(success))]
-        ]
-        every = [
-            [correlation(metrics[..., k], success) for k in range(len(names))] for metrics, success in chosen
-        ]
-        return np.mean(every, axis=0)
+    def mean(measured, succeeded):
+        """Return each metric's mean ρ: modes whose metrics count, and those whose success stands for it."""
+        every = []
+        for group in groups.values():
+            first, second = ([mode for mode in order if mode in group] for order in (measured, succeeded))
+            success = np.array([group[mode][1] for mode in second])
+            metrics = np.array([[[row[name] for name in names] for row in group[mode][0]] for mode in first])
+            every.append([correlation(metrics[..., k], success) for k in range(len(names))] if first else 0.0)
+        return np.mean(np.broadcast_arrays(*every, np.zeros(len(names)))[:-1], axis=0)
 
-    def drawn(count):
-        modes = rng.integers(count, size=count)
-        return modes, modes
-
-    found = mean(lambda count: (np.arange(count), np.arange(count)))
-    again = np.array([mean(drawn) for _ in range(TIMES)])
-    chance = np.array(
-        [np.abs(mean(lambda n: (np.arange(n), rng.permutation(n)))).max() for _ in range(TIMES)]
-    )
+    found = mean(modes, modes)
+    again = np.array([mean(order, order) for order in rng.choice(modes, (TIMES, len(modes)))])
+    chance = np.array([np.abs(mean(modes, rng.permutation(modes))).max() for _ in range(TIMES)])
     low, high = np.quantile(again, (0.025, 0.975), axis=0)
-    print(f"{len(tables)} groups, {sum(success.size for _, success in tables)} policies")
+    policies = sum(len(success) for group in groups.values() for _, success in group.values())
+    print(f"{len(groups)} groups, {policies} policies")
     for k in np.argsort(-np.abs(found)):
         p = (1 + np.sum(chance >= abs(found[k]) - 1e-9)) / (1 + TIMES)
         print(f"{names[k]}: {found[k]:+.2f} ({low[k]:+.2f} to {high[k]:+.2f}), p over all metrics {p:.3f}")

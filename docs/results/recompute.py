@@ -44,7 +44,8 @@ def declared(design):
     for pair in design.get("pairs", ()):
         kind = f"realised-{pair.get('budget', 'time')}"
         weights = {(pair["one"], kind): 1, (pair["other"], kind): -1}
-        yield f"{pair['one']} − {pair['other']}", weights, pair.get("margin")
+        words = f"{pair['one']} − {pair['other']}" + " (same number)" * (kind == "realised-number")
+        yield words, weights, pair.get("margin")
     factors, rounds = design.get("factors", {}), design.get("rounds", {})
     for name in factors.get("primary", ()):
         modes = [(factors[cell], "realised-time") for cell in CELLS]
@@ -74,6 +75,10 @@ def main(archive, preset):
     for words, weights, margin in declared(design):
         tasks = design["tasks"]
         spread = {(task, *which): w / len(tasks) for task in tasks for which, w in weights.items()}
+        if any(set(rollouts[policy]) != set(range(design["draws"])) for policy in spread):
+            sys.exit(
+                f"{words}: expected {design['draws']} draws of each policy, found fewer: nothing is tested"
+            )
         mean, error, count = estimate(spread, rollouts)
         half = stats.t.ppf(0.975, count - 1) * error
         low, high = mean - half, mean + half

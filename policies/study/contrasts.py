@@ -19,16 +19,17 @@ DECLARED, EXPLORATORY, SYSTEM = "declared", "exploratory", "system"
 def contrasts(results: Results) -> list[Contrast]:
     """Return all contrasts for which there is something: the declared ones first, p adjusted over these.
 
-    Nothing is tested before all draws are there: who looks in between and stops where it suits finds more.
+    Nothing is tested before all draws of all of them are there: a look in between that ends a study where it
+    suits finds more. What is not tested has no p.
     """
     design, tasks = results.progress.design, tuple(results.progress.design.tasks)
     asked = [(each.label, each.parts) for each in declared(design)]
     first = [each for one in asked if (each := _contrast(results, DECLARED, tasks, *one))]
-    whole = [each for each in first if each.counts == (design.draws,) != (1,)]
-    tested = {each.label: each for each in adjusted(whole)}
-    found = [replace(tested.get(each.label, each), tests=len(asked)) for each in first]
+    complete = len(first) == len(asked) and all(each.counts == (design.draws,) != (1,) for each in first)
+    found = adjusted(first) if complete else [replace(each, p=None, tests=len(asked)) for each in first]
     scopes = [*([tasks] if len(tasks) > 1 else []), *((task,) for task in tasks)]
-    found += [each for scope in scopes for each in _exploratory(results, design, scope) if each]
+    more = (each for scope in scopes for each in _exploratory(results, design, scope) if each)
+    found += [replace(each, p=None) for each in more]
     once: dict[tuple[str, ...], Contrast] = {}
     for each in found:
         once.setdefault((each.label, each.scope, each.measure.name), each)
@@ -48,7 +49,8 @@ def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) 
         return
     if not factors:
         rivals = [mode for mode in design.modes if mode != design.baseline]
-        yield from (ask(*of_pair(mode, design.baseline)) for mode in rivals)
+        for mode, ending in product(rivals, ("", " same number")):
+            yield ask(*of_pair(mode, design.baseline, ending))
         for each in declared(design):
             yield ask(each.label, each.parts)
             yield ask(each.label, each.parts, "clean")

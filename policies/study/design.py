@@ -238,6 +238,13 @@ class StudyDesign:
         check_known(
             "mode of a pair", (mode for each in self.pairs for mode in (each.one, each.other)), self.modes
         )
+        pairs = [(each.one, each.other, each.budget) for each in self.pairs]
+        if len(set(pairs)) < len(pairs) or any(one == other for one, other, _ in pairs):
+            raise HandrailError(f"study {self.name}: pairs: expected two modes each, once, got {pairs}")
+        counted = self.beside if self.beside and self.beside.same_number == self.draws else Beside()
+        numbered = counted.numbered or (self.modes if counted.same_number else ())
+        by_number = (mode for *two, budget in pairs if budget == "number" for mode in two)
+        check_known("mode of a pair by number, which same_number has in all draws", by_number, numbered)
         if self.pairs and self.factors and self.factors.primary:
             raise HandrailError(f"study {self.name}: expected pairs or factors.primary, got both")
         most = min(task.steps for task in self.tasks.values())

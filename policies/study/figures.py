@@ -188,7 +188,8 @@ def _robustness(tasks: Sequence[str], results: Results) -> Any:
         names = ["", *dict.fromkeys(each.treatment for each in treated)]
         labels = list(dict.fromkeys(each.label for each in treated))
         for place, label in enumerate(labels):
-            shown = [found for name in names if (found := results.find(task, label, name))]
+            mine = [each for name in names if (each := results.find(task, label, name))]
+            shown = [each for one in mine if (each := one.beside(mine[-1]))]
             shift = 0.5 * ((place + 0.5) / len(labels) - 0.5)
             xs = [names.index(each.treatment) + shift for each in shown]
             values = np.array([each.value.estimate for each in shown])
@@ -196,7 +197,7 @@ def _robustness(tasks: Sequence[str], results: Results) -> Any:
             style = _style(shown[0], results) | {"ls": "", "elinewidth": 1.2, "ms": 5}
             axes.errorbar(xs, 100 * values, yerr=errors, **style)
         axes.set(xticks=range(len(names)), ylim=(-3, 103))
-        axes.set_xticklabels(["undisturbed", *names[1:]], rotation=20)
+        axes.set_xticklabels(["without", *names[1:]], rotation=20)
         tidy(axes, "y")
     figure.axes[0].set_ylabel("policy success [%], 95 %")
     pairs = [zip(*axes.get_legend_handles_labels(), strict=True) for axes in figure.axes]

@@ -33,14 +33,15 @@ _LIMITS = (
 _HOW = (
     "A draw is a fresh recording (other scenes, other scripted persons), one training seed and beginnings"
     " of its own; it is the same for all modes, so draws are pairs. Every mode got the same operator time,"
-    " failed attempts included. With [flat] in the design each policy was trained until its loss on held-out"
+    " failed attempts included; “same number” is of demonstrations instead."
+    " With [flat] in the design each policy was trained until its loss on held-out"
     " episodes fell no longer; without it every policy got the same updates. Policies write joint velocities,"
     " which go to the robot unprotected; an “intent” is the operator's command, which the MPC completes when"
     " the policy drives, too. Intervals are 95 %: Student's t over draws, where a draw varies at least as its"
     " rollouts do; with one draw Wilson's, of these very policies. Contrasts are taken within each draw;"
     " several tasks count alike. Only declared contrasts are tested, p after Holm over these; all others"
     " explore, and no interval is adjusted. A system claim compares a policy and a controller with the best"
-    " of the unprotected policies in this very measure, chosen afterwards, which is in its favour."
+    " of the unprotected policies in this very measure, chosen afterwards, which favours that policy."
 )
 _HOW_ROUNDS = (
     "A draw is a fresh recording (other scenes, other scripted persons), one training seed and beginnings"

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from handrail.datasets.comparison.policies import compare_rollouts
 from handrail.datasets.comparison.report import contrast_table
 from handrail.datasets.presentation import wording
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.contrast import Contrast
+from handrail.datasets.statistics.replicates import student
 from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM
 from handrail.policies.study.declared import declared
 from handrail.policies.study.power import detectable
@@ -44,11 +44,10 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
     if kind == DECLARED:
         asked = declared(design) if design.draws > 1 else []
         planned = {each.label: f"{100 * detectable(design, each):.0f} points" for each in asked}
-        columns += ["p", "p, Holm", "detectable"]
+        columns += ["p", "p, Holm"]
         more["detectable, as planned"] = lambda each: planned.get(each.label, DASH)
     chosen = [each for each in found if each.family == kind]
-    caption = "n: draws" + ("; detectable: from the spread seen" if more else "")
-    return contrast_table(chosen, columns, _TITLES[kind], caption, more)
+    return contrast_table(chosen, columns, _TITLES[kind], "n: draws", more)
 
 
 def conditions_table(task: str, results: Results) -> Table:
@@ -157,7 +156,8 @@ def treatments_table(task: str, results: Results) -> Table:
 def _treatment(each: StudyCondition, results: Results) -> tuple[str, ...]:
     whole, shown, before = results.find(each.task, each.label), [DASH] * 3, DASH
     if whole and (same := whole.beside(each)):
-        change = compare_rollouts(each.runs(), same.runs())
+        apart = [each.share(draw) - same.share(draw) for draw in each.draws]
+        change = student(apart, each.least() + same.least())
         difference = [wording.points(change.estimate), wording.points_span(change.interval)]
         shown = [percent(float(same.rolled().mean())), *difference]
         before = percent(float(same.rolled("contact").mean()))

@@ -34,7 +34,20 @@ def test_what_was_declared_comes_out_as_published():
         assert found[name] == pytest.approx([*shares, estimate["p"], each["p_adjusted"]], abs=1e-3)
 
 
-def test_the_metric_that_goes_with_success_is_named_first(tmp_path):
+def test_an_archive_that_lacks_a_draw_is_not_tested(tmp_path):
+    design = tmp_path / "more.toml"
+    factors = (ROOT / "policies" / "study" / "presets" / "factors.toml").read_text()
+    design.write_text(factors.replace("draws = 8", "draws = 9"))
+    script = [sys.executable, RESULTS / "recompute.py", RESULTS / "teleop_modes_factors.tar.xz", design]
+    done = subprocess.run(script, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "expected 9 draws of each policy" in done.stderr
+    assert not done.stdout
+
+
+@pytest.mark.parametrize("amounts", [1, 3])
+def test_the_metric_that_goes_with_success_is_named_first(tmp_path, amounts):
+    """What several amounts of the same recordings say is said once: p is as of one of them."""
     rng, draws = np.random.default_rng(0), range(3)
     shares = {(mode, draw): rng.random() for mode in "abcd" for draw in draws}
     jobs = {
@@ -44,11 +57,12 @@ def test_the_metric_that_goes_with_success_is_named_first(tmp_path):
     conditions = [
         {
             "task": "reach",
-            "label": mode,
+            "label": f"{mode} {amount} min" if amount else mode,
             "treatment": "",
             "draws": {str(draw): shares[mode, draw] for draw in draws},
         }
         for mode in "abcd"
+        for amount in range(amounts)
     ]
     study = {"design": {"draws": 3}, "jobs": jobs, "conditions": conditions}
     (tmp_path / "study.json").write_text(json.dumps(study))
@@ -59,8 +73,9 @@ def test_the_metric_that_goes_with_success_is_named_first(tmp_path):
         check=True,
     )
     count, first, other = done.stdout.splitlines()
-    assert count == "1 groups, 12 policies"
+    assert count == f"{amounts} groups, {12 * amounts} policies"
     assert first.startswith("telling: -1.00 (-1.00 to -1.00), p ")
+    assert float(first.split()[-1]) == pytest.approx(1 / 24, abs=0.02)  # of all orders of four modes
     assert other.startswith("other: ")
 
 

@@ -57,6 +57,12 @@ PAIR = "[[pairs]]\none = 'ee'\nother = 'direct'\n"
         (("[beside]", PAIR.replace("direct", "leader") + "[beside]"), "unknown mode of a pair 'leader'"),
         (("[beside]", PAIR + FACTORS + "[beside]"), "expected pairs or factors.primary, got both"),
         (("[beside]", PAIR.replace("one", "own") + "[beside]"), "own"),
+        (("[beside]", PAIR.replace("direct", "ee") + "[beside]"), "pairs: expected two modes each, once"),
+        (("[beside]", 2 * PAIR + "[beside]"), "pairs: expected two modes each, once"),
+        (
+            ("[beside]", PAIR + "budget = 'number'\n[beside]"),
+            "unknown mode of a pair by number, which same_number has in all draws 'ee'",
+        ),
         (
             ("rollouts = 40", "rollouts = 40\ncurve = [4, 6]"),
             "curve expected multiples of the first below 10",
