@@ -7,7 +7,8 @@ draws = 8                       replicates: each a fresh recording with persons 
                                 and beginnings of its own for the rollouts; the same for all modes
 rollouts = 50                   of each policy
 persons = 5                     scripted operators of a recording, who take turns
-seed = 0                        of everything: another seed is another study of the same kind
+seed = 0                        of recordings and rollouts: another seed is another study of the same kind;
+                                trainings have the number of the draw
 curve = [5000, 10000]           optional: what policies have learnt after fewer updates drives, too; multiples
                                 of the first
 

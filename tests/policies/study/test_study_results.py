@@ -11,6 +11,7 @@ from figure_helpers import shows
 from made_study import DESIGN, FACTORS, MODES, SHARES, TASK
 from scipy import stats
 
+from handrail.datasets.presentation import wording
 from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.replicates import (
     equivalence_p,
@@ -248,11 +249,20 @@ def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(ga
     results = gathered(robust)
     table = tables.treatments_table("reach", results)
     assert {row[0] for row in table.rows} == {*MODES, "ee intent"}
+    robustness = figures(results, ())["robustness"]
     for condition in results.of_task("reach", treated=True):
         assert set(condition.draws) == {0, 1}
         whole = results.find("reach", condition.label)
         for draw, each in condition.draws.items():
             assert set(each.rollouts) < set(whole.draws[draw].rollouts)
+        same = whole.beside(condition)
+        assert shows(robustness, [100 * same.value.estimate, 100 * condition.value.estimate])
+        apart = [condition.share(draw) - same.share(draw) for draw in (0, 1)]
+        (row,) = (row for row in table.rows if row[:2] == (condition.label, condition.treatment))
+        assert row[4] == wording.points(np.mean(apart))
+        by_scipy: Any = stats.ttest_1samp(apart, 0.0)
+        low, high = (float(each) for each in row[5].replace("−", "-").replace("+", "").split(" to "))
+        assert high - low >= 100 * np.diff(by_scipy.confidence_interval())[0] - 1.0
 
 
 def test_intents_without_the_mpc_and_velocities_through_it_stand_beside_what_they_were(gathered):
