@@ -17,7 +17,7 @@ TURNS = 30  # of the loop, for all to come to rest
 
 
 class LiveSocket:
-    """A page's socket as the web server has it: nothing goes out while its network is dead, not even its end."""
+    """A page's socket as the web server has it: nothing goes out of a dead network, no close either."""
 
     def __init__(self, is_dead=False):
         self._come, self._takes, self.closed = asyncio.Queue(), asyncio.Event(), None
