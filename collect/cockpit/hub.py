@@ -72,8 +72,8 @@ class Hub:
         self._pipe.send(Kind.DROPPED, {why: n for why, n in self.counts.items() if n})
 
     async def serve(self, socket: WebSocket, name: str) -> None:
-        """Serve a page until it goes."""
-        if len(self._pages) >= MOST_PAGES:
+        """Serve a page until it goes; no other one makes it wait, also not one whose network is dead."""
+        if len({page.name for page in self._pages} | {name}) > MOST_PAGES:
             self.counts["more pages than allowed"] += 1
             await socket.close(1013)
             return
@@ -81,26 +81,26 @@ class Hub:
         page = PageSocket(socket, name)
         for other in [other for other in self._pages if other.name == name]:
             self._part(other)  # a reload, or a copy of the tab; one of them drives at most
-            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-                await other.socket.close(REPLACED)
+            other.offer("close", REPLACED)
         self._pages.add(page)
         delivery = asyncio.create_task(page.deliver())
+        delivery.add_done_callback(lambda _: self._part(page))  # it takes nothing
         try:
             if self._lease.is_free_for(name):
                 self._lease.take(name)
             if Kind.STAGE in self._kept:
                 page.offer(Kind.STAGE, self._kept[Kind.STAGE])
             self._tell_all()
-            await self._listen(page, delivery)
-        except (WebSocketDisconnect, RuntimeError, TimeoutError):
-            pass  # it is gone, or takes nothing
+            await self._listen(page)
+        except (WebSocketDisconnect, RuntimeError):
+            pass  # it is gone
         finally:
             delivery.cancel()
             page.end()
             self._part(page)
 
     def _part(self, page: PageSocket) -> None:
-        """Take note that a page is gone."""
+        """Take note that a page is gone; if it is still heard, then only when it says STOP."""
         if page not in self._pages:
             return
         self._pages.discard(page)
@@ -115,13 +115,14 @@ class Hub:
         self._lease.settle()
         self._tell_all()
 
-    async def _listen(self, page: PageSocket, delivery: "asyncio.Task[None]") -> None:
+    async def _listen(self, page: PageSocket) -> None:
         """Take a page's messages; one that is cut off may still say STOP."""
-        while not delivery.done() and page in self._pages and not page.is_cut:
+        while page in self._pages and not page.is_cut:
             self._take_all(page, await page.hear(), time.monotonic())
+        self._part(page)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_LAST_WORDS):
-                while page.is_cut:
+                while True:
                     self._take_all(page, await page.hear(), time.monotonic())
         await page.socket.close(1008)
 
@@ -138,7 +139,7 @@ class Hub:
             self._presses.extend(filter(None, presses.values()))
             self._stopped = now
             self._pipe.send_surely(Kind.STOP, instead_of=(Kind.STOP, Kind.ASK))
-        for number, each in enumerate(said if not page.is_cut else ()):
+        for number, each in enumerate(said if page in self._pages else ()):
             may = page.may_say(now)
             try:
                 if isinstance(each, HandrailError):

@@ -35,7 +35,7 @@ class PageSocket:
         self.sequence, self.echo, self.round_trip, self.is_late = -1, 0.0, 0.0, False
         self.bad = self.too_fast = 0
         self._allowance, self._before = _MOST_MESSAGES, 0.0
-        self._newest: dict[Hashable, str | bytes] = {}
+        self._newest: dict[Hashable, str | bytes | int] = {}
         self._next: dict[Hashable, float] = {}
         self._waiting = asyncio.Event()
         self._coming = asyncio.ensure_future(socket.receive())
@@ -76,8 +76,11 @@ class PageSocket:
         """Hear no more."""
         self._coming.cancel()
 
-    def offer(self, kind: Hashable, data: str | bytes, period: float = 0.0) -> None:
-        """Let it have a message instead of an older one of its kind that still waits, one a period [s]."""
+    def offer(self, kind: Hashable, data: str | bytes | int, period: float = 0.0) -> None:
+        """Let it have a message instead of an older one of its kind that still waits, one a period [s].
+
+        A number is the code to close it with.
+        """
         now = time.monotonic()
         if not period or now >= self._next.get(kind, 0.0):
             self._next[kind] = now + period
@@ -106,6 +109,7 @@ class PageSocket:
                 kind = next(iter(self._newest))
                 data = self._newest.pop(kind)
                 send = self.socket.send_bytes if isinstance(data, bytes) else self.socket.send_text
+                send = self.socket.close if isinstance(data, int) else send
                 await asyncio.wait_for(send(data), SLOW)  # pyright: ignore[reportArgumentType]
 
 

@@ -104,18 +104,22 @@ class Pipe:
         return True
 
     def receive(self) -> list[Message]:
-        """Return all messages that have come, the oldest first."""
-        messages: list[Message] = []
-        try:
-            while packet := self._socket.recv(2 * _PACKET):
-                self._parts.append(packet[1:])
-                if packet[:1] == _LAST:
-                    messages.append(_DECODER.decode(b"".join(self._parts)))
-                    self._parts.clear()
-        except BlockingIOError:
-            return messages
-        except OSError:
-            messages.clear()
+        """Return all messages that have come, the oldest first; of an end that is gone the last ones, too."""
+        messages, errors = list[Message](), 0
+        while errors < 2:
+            try:
+                packet = self._socket.recv(2 * _PACKET)
+            except BlockingIOError:
+                return messages
+            except OSError:
+                errors += 1  # the first: it went with something unread; what it has sent is still here
+                continue
+            if not packet:
+                break
+            self._parts.append(packet[1:])
+            if packet[:1] == _LAST:
+                messages.append(_DECODER.decode(b"".join(self._parts)))
+                self._parts.clear()
         if not messages:
             raise HandrailError("cockpit: the other end of the pipe is gone")
         return messages

@@ -66,12 +66,12 @@ class ServerProcess:
     def receive(self) -> list[Message]:
         """Return what the server has passed on: `LOST` when it died, `NOTE` when another one has begun."""
         try:
-            messages = self.unread + self.pipe.receive()
-            self.unread = []
+            messages = self.pipe.receive()
             self.pipe.flush()
         except HandrailError:
             self._start_again()
-            return [(Kind.LOST, None)]
+            messages = [(Kind.LOST, None)]
+        messages, self.unread = self.unread + messages, []
         for kind, value in messages:
             if kind is Kind.NOTE:
                 self._take(**value)
@@ -139,6 +139,8 @@ class ServerProcess:
             for kind, value in self.pipe.receive():
                 if kind is Kind.NOTE:
                     self._take(**value)
+                else:
+                    self.unread.append((kind, value))
 
 
 def open_server(config: CockpitConfig, say: Callable[[str], None]) -> ServerProcess:

@@ -1,16 +1,29 @@
 """Laws of cards: only who drives sees them and answers, also after a reload; answers are small values."""
 
 import json
+import sys
 import time
 
 import pytest
-from cockpit_helpers import drive, heard, page, told
+from cockpit_helpers import drive, heard, page, server, told
 
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.cockpit.pipe import Kind
 
 CARD = {"id": "ee/tlx", "title": "How was it?", "answers": {"mental": 40}}
+
+
+STOPPING_SERVER = """#!{python}
+import select, socket, sys
+from handrail.collect.cockpit.pipe import Kind, Pipe
+
+pipe = Pipe(socket.socket(fileno=int(sys.argv[3])))
+sys.stdin.read()
+pipe.send_surely(Kind.STOP)
+pipe.send_surely(Kind.NOTE, {{"address": "http://127.0.0.1:1/", "port": 1}})
+select.select([pipe], [], [])  # until the recording goes
+"""
 
 
 def said(**changes):
@@ -58,6 +71,28 @@ def test_a_stop_between_episodes_is_left_for_the_next_one(served):
         cards.hear(0.0)
         assert heard(served, {Kind.STOP}) == [(Kind.STOP, None)]
         assert not heard(served, {Kind.STOP}, patience=0.1)
+
+
+def test_a_stop_that_is_left_outlives_the_web_server():
+    """Also one that a study carries over into its next mode."""
+    with server() as made:
+        cards = Cards(made)
+        made.unread.append((Kind.STOP, None))
+        made.process.kill()
+        made.process.wait()
+        cards.hear()
+        assert heard(made, {Kind.STOP}) == [(Kind.STOP, None)]
+        assert not heard(made, {Kind.STOP}, patience=0.1)
+
+
+def test_a_stop_that_is_said_while_the_server_starts_is_heard(tmp_path, monkeypatch):
+    program = tmp_path / "server"
+    program.write_text(STOPPING_SERVER.format(python=sys.executable))
+    program.chmod(0o755)
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "executable", str(program))
+        with server() as made:
+            assert heard(made, {Kind.STOP}) == [(Kind.STOP, None)]
 
 
 def test_a_card_that_nobody_acknowledges_is_shown_again(served):

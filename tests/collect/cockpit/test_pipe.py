@@ -125,3 +125,16 @@ def test_an_end_that_is_gone_is_told(ends):
     assert ours.receive() == [(Kind.DRIVE, b"last")]
     with pytest.raises(HandrailError, match="gone"):
         ours.receive()
+
+
+def test_the_last_words_of_an_end_that_is_gone_are_heard_whatever_it_left_unread(ends):
+    """The system tells the reset of the connection before them."""
+    ours, theirs = ends
+    for _ in range(3):
+        ours.send(Kind.FRAME, b"")
+    theirs.send_surely(Kind.STOP)
+    theirs.close()
+    assert ours.receive() == [(Kind.STOP, None)]
+    for _ in range(2):
+        with pytest.raises(HandrailError, match="gone"):
+            ours.receive()
