@@ -7,13 +7,14 @@ import os
 import select
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.key_bytes import (
     FOCUS_IN,
     FOCUS_OUT,
     INTERRUPT,
+    STOPS,
     TELLS_RELEASES,
     THERE,
     Key,
@@ -23,7 +24,7 @@ from handrail.controllers.errors import HandrailError
 
 HELD = 0.2  # after its last character, a key of a terminal that does not tell releases counts as let go [s]
 _AGAIN = 0.7  # what comes earlier is a repetition, whose first one comes after 0.25 to 0.66 s [s]
-_ASKS = 0.05  # while keys are held, a terminal is asked that often whether it is there [s]
+_ASKS = 0.05  # a terminal is asked that often whether it is there [s]
 _SILENCE = 0.15  # without an answer, nobody is there [s]
 _WAIT = 0.008  # for keys [s]
 _AT_ONCE = 4096  # bytes
@@ -118,25 +119,32 @@ class Keyboard:
     Most terminals tell only characters: a key that is held comes again and again, the first time after about
     half a second. A key counts as held for 0.2 s after each. Terminals with kitty's keyboard protocol tell
     when keys go up; these are asked 20 times a second whether they are still there, so that a connection that
-    hangs is no key that is held.
+    hangs is no key that is held. So is every terminal beside something else that moves the robot.
 
     Args:
         terminal: the one to read.
         clock: of readings [s].
+        stops: keys of the emergency stop: no rule keeps them back.
+        supervises: whether something else moves the robot while nothing is held.
     """
 
     name = "keyboard"
 
     def __init__(
-        self, terminal: KeyTerminal | None = None, clock: Callable[[], float] = time.monotonic
+        self,
+        terminal: KeyTerminal | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        stops: Collection[str] = STOPS,
+        supervises: bool = False,
     ) -> None:
         self._terminal, self._clock = terminal or KeyTerminal(), clock
+        self._stops, self._supervises = stops, supervises
 
     def open(self) -> None:
         """Take the terminal."""
-        self._bytes = KeyBytes()
+        self._bytes = KeyBytes(self._stops)
         self._held: dict[str, float] = {}
-        self._last: dict[str, float] = {}
+        self._last = "", 0.0  # key that came, and when [s]
         self._tells_releases, self._in_focus = False, True
         self._heard = self._asked = self._round_trip = 0.0
         self._waits = False  # for an answer
@@ -151,7 +159,8 @@ class Keyboard:
         presses = [key.name for key in self._bytes.take(data, now) if self._takes(key, now)]
         if not self._tells_releases:
             self._held = {name: since for name, since in self._held.items() if now - since <= HELD}
-        silent = self._tells_releases and bool(self._held) and self._is_silent(now)
+        must_answer = self._supervises or (self._tells_releases and bool(self._held))
+        silent = must_answer and self._is_silent(now)
         return DeviceInput(
             self._heard if silent else now,
             dict.fromkeys(self._held, 1.0),
@@ -177,9 +186,10 @@ class Keyboard:
         elif key.change == "up":
             self._held.pop(key.name, None)
         elif key.name != THERE:
-            before = self._last.get(key.name, -_AGAIN)
-            self._last[key.name] = self._held[key.name] = now
-            return key.change == "down" and (self._tells_releases or now - before >= _AGAIN)
+            last, before = self._last
+            self._last, self._held[key.name] = (key.name, now), now
+            again = not self._tells_releases and key.name == last and now - before < _AGAIN
+            return key.name in self._stops or (key.change == "down" and not again)
         return False
 
     def _is_silent(self, now: float) -> bool:
@@ -187,7 +197,7 @@ class Keyboard:
         if not self._waits and now - self._asked >= _ASKS:
             self._asked, self._waits = now, True
             self._terminal.write(ARE_YOU_THERE)
-        return now - self._heard > _SILENCE
+        return self._waits and now - self._asked > _SILENCE
 
     def _answered(self, now: float) -> None:
         if self._waits:

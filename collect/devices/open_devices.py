@@ -1,5 +1,6 @@
 """The operators with a device at this computer, by the names of the command line."""
 
+import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 
@@ -31,6 +32,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 
 Say = Callable[[str], None]
+_MULTIPLEXERS = {"TMUX": "tmux", "STY": "screen", "ZELLIJ": "zellij"}  # by the variable that each sets
 
 
 def open_device(
@@ -47,7 +49,7 @@ def open_device(
         modes: that one can change to; all by default.
     """
     hands = len(env.model.description.hands)
-    main, beside = _reader(config.operator, config.teleop, hands), None
+    main, beside = _reader(config.operator, config.teleop, hands, bool(config.policy)), None
     if config.operator != "keyboard" and has_terminal():
         beside = _reader("keyboard", TeleopConfig(), hands)
         beside.controls = beside.controls.only()
@@ -64,22 +66,24 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     twin = None if file.is_file() else same_arm(teleop, arm)
     calibration = twin or load_calibration(file, arm, how_to_calibrate(teleop, config.robot))
     main = DeviceReader(LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources))
-    beside = _reader(teleop.beside, teleop, len(description.hands))
+    beside = _reader(teleop.beside, teleop, len(description.hands), bool(config.policy))
     beside.controls = beside.controls.only("base")
     person = _person(config, env, modes, main, beside, Follower(env.model, calibration))
     say(f"{teleop.type}: hold {control_of([beside.controls], CLUTCH)} on the {teleop.beside} to move the arm")
     return person
 
 
-def _reader(name: str, teleop: TeleopConfig, hands: int) -> DeviceReader:
+def _reader(name: str, teleop: TeleopConfig, hands: int, supervises: bool = False) -> DeviceReader:
     """Return the reader of a device, with the map of the settings for so many hands."""
     shape = StickShape(teleop.dead_zone, teleop.exponent)
-    device, controls = {
-        "gamepad": (Gamepad(shape), gamepad.CONTROLS),
-        "spacemouse": (SpaceMice(shape) if hands > 1 else SpaceMouse(shape), spacemouse.CONTROLS),
-        "keyboard": (Keyboard(), NAMES),
+    known = {"gamepad": gamepad.CONTROLS, "spacemouse": spacemouse.CONTROLS, "keyboard": NAMES}[name]
+    controls = load_map(name, known, teleop.map, hands)
+    device = {
+        "gamepad": Gamepad(shape),
+        "spacemouse": SpaceMice(shape) if hands > 1 else SpaceMouse(shape),
+        "keyboard": Keyboard(stops=controls.stops, supervises=supervises),
     }[name]
-    return DeviceReader(device, load_map(name, controls, teleop.map, hands))
+    return DeviceReader(device, controls)
 
 
 def _person(
@@ -91,8 +95,10 @@ def _person(
     follower: Follower | None = None,
 ) -> LocalPerson:
     """Return the person, their devices opened; where one cannot be, those before are given back."""
-    alone = config.policy and not control_of([main.controls], HOLD)  # with no dead-man to let go of
-    person = Person(env.model, modes, config.mode_name, supervises=bool(alone))
+    alone = bool(config.policy) and not control_of([main.controls], HOLD)  # with no dead-man to let go of
+    if alone:
+        _check_answers(config, beside if beside and follower else main, bool(follower))
+    person = Person(env.model, modes, config.mode_name, supervises=alone)
     person.ask(Ask("frame", "base"))
     with ExitStack() as stack:
         for reader in filter(None, (main, beside)):
@@ -100,6 +106,22 @@ def _person(
             reader.start()
         stack.pop_all()
     return LocalPerson(person, main, beside, follower)
+
+
+def _check_answers(config: RecordConfig, steers: DeviceReader, leads: bool) -> None:
+    """Check that who supervises a policy with nothing held has a device that says whether it is there."""
+    where, is_keyboard = f"--operator {config.operator} beside --policy", isinstance(steers.device, Keyboard)
+    if not (is_keyboard or leads):
+        raise HandrailError(
+            f"{where}: expected a control to hold while the policy drives, found none; give one the action "
+            '"hold" with --teleop.map, or say --operator gamepad'
+        )
+    within = next((name for variable, name in _MULTIPLEXERS.items() if variable in os.environ), "")
+    if is_keyboard and within:
+        raise HandrailError(
+            f"{where}: expected a terminal that falls silent when its connection hangs, got {within}, which "
+            "answers in its place; start it outside, or say --operator gamepad"
+        )
 
 
 def _led(modes: Mapping[str, TeleopMode], env: HandrailEnv, first: str) -> dict[str, TeleopMode]:

@@ -128,6 +128,20 @@ def test_the_stop_and_its_release(device):
     assert isinstance(driven.act(), Intent)
 
 
+@pytest.mark.parametrize("beside", ["", "keyboard"])
+def test_a_stop_is_heard_though_its_device_is_gone_since(beside):
+    driven = Driven("gamepad", beside=beside)
+    driven.begin()
+    device = driven.beside or driven.main
+    device.presses, device.gone = ["space" if beside else "b"], True
+    assert driven.act() is EpisodeEvent.PAUSE
+    assert driven.person.phase is Phase.STOPPED
+    driven.local.reset(driven.view(), np.random.default_rng(0))
+    device.gone = False
+    driven.person.ask(Ask("start"))
+    assert driven.act() is EpisodeEvent.PAUSE
+
+
 def test_choices_while_driving():
     driven = Driven("keyboard", "switching")
     driven.begin()
