@@ -7,7 +7,6 @@ from typing import Self
 from handrail.collect.devices.control_map import ControlMap, Moves, Steered
 from handrail.collect.devices.device import Device, DeviceInput
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.controllers.interface.intent import LONG_AGO
 
 _RETRY = 1.0  # between two attempts to find a device that is gone [s]
 _PATIENCE = 20.0  # with its first opening [s]
@@ -64,7 +63,7 @@ class DeviceReader:
     def input(self, steered: Steered) -> tuple[DeviceInput | None, tuple[str, ...]]:
         """Return what the device says now in the words of its map, none while it is gone, and all it asks."""
         newest, presses = self.take()
-        meant = self.controls.meant(newest or DeviceInput(LONG_AGO), presses, self.moves(steered))
+        meant = self.controls.meant(newest or DeviceInput(0.0), presses, self.moves(steered))
         return meant if newest else None, meant.presses
 
     def close(self) -> None:

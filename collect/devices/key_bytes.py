@@ -13,14 +13,12 @@ _ESCAPE = 0x1B
 _ALONE = 0.05  # after that, an Escape is the key and no sequence [s]
 _LONGEST = 64  # of a sequence [bytes]
 _MOST = 8  # plain characters at once: more are pasted, not typed
-_CSI = re.compile(rb"\x1b\[([0-?]*)[!-/]*([@-~])")
-_SS3 = re.compile(rb"\x1bO[0-?]*([@-~])")
-_BEGUN = re.compile(rb"\x1b[O[][0-?]*[!-/]*")  # one of these that has no end yet
+_SEQUENCE = re.compile(rb"\x1b([O[])([0-?]*)[!-/]*([@-~]?)")  # without the last one it has no end yet
 _ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
-_NAMED = {0: "space", 9: "tab", 10: "enter", 13: "enter", 27: "escape", 32: "space", 127: "backspace", 8: "backspace"}
+_NAMED = {9: "tab", 10: "enter", 13: "enter", 27: "escape", 127: "backspace", 8: "backspace"}
+_NAMED |= dict.fromkeys((0, 32), "space")  # with Control it is 0
 _CHANGES: dict[str, Change] = {"1": "down", "2": "again", "3": "up"}
 _ALT, _CONTROL = 2, 4  # bits of the modifiers
-STOPS = ("space",)  # in Handrail's own table
 NAMES = frozenset({*_NAMED.values(), *_ARROWS.values(), *(chr(code).lower() for code in range(0x21, 0x7F))})
 
 
@@ -42,7 +40,7 @@ class KeyBytes:
         stops: keys that are never kept back, pasted or not, whatever is held with them.
     """
 
-    def __init__(self, stops: Collection[str] = STOPS) -> None:
+    def __init__(self, stops: Collection[str] = ("space",)) -> None:
         self._stops, self._rest, self._since = stops, b"", 0.0
 
     def take(self, data: bytes, now: float) -> list[Key]:
@@ -54,36 +52,29 @@ class KeyBytes:
             size, key = self._first(waits=now - self._since < _ALONE)
             if not size:
                 break
-            if key:
+            if key and (key.name in self._stops or not key.is_chord):
                 keys.append((key, self._rest[0] != _ESCAPE))
             self._rest = self._rest[size:]
         is_pasted = sum(is_typed for _, is_typed in keys) > _MOST
-        return [
-            key
-            for key, is_typed in keys
-            if key.name in self._stops or not (key.is_chord or (is_pasted and is_typed))
-        ]
+        return [key for key, is_typed in keys if key.name in self._stops or not (is_pasted and is_typed)]
 
     def _first(self, waits: bool) -> tuple[int, Key | None]:
         """Return how many bytes the first key has, 0 while it waits for more, and the key, None of no key."""
         rest = self._rest
         if rest[0] != _ESCAPE:
             return 1, _of_code(rest[0])
-        if found := _CSI.match(rest):
-            return found.end(), _of_sequence(found[1].decode(), found[2])
-        if found := _SS3.match(rest):
-            return found.end(), Key(_ARROWS[found[1]]) if found[1] in _ARROWS else None
+        if found := _SEQUENCE.match(rest):
+            size = found.end()  # what cannot belong to it comes after it
+            more = waits and not found[3] and size == len(rest) < _LONGEST
+            return (0, None) if more else (size, _of_sequence(found[1], found[2].decode(), found[3]))
         if rest == b"\x1b":
             return (0, None) if waits else (1, Key("escape"))
-        if found := _BEGUN.match(rest):  # what cannot belong to it comes after it
-            size = found.end()
-            return (0, None) if waits and size == len(rest) < _LONGEST else (size, None)
         return (1, Key("escape")) if rest[1] == _ESCAPE else (2, _of_code(rest[1], _ALT))
 
 
-def _of_sequence(parameters: str, final: bytes) -> Key | None:
-    """Return what a sequence `ESC [ parameters final` says; None where it is no key that is known."""
-    if parameters == "" and final in (b"I", b"O"):
+def _of_sequence(kind: bytes, parameters: str, final: bytes) -> Key | None:
+    """Return what a sequence `ESC kind parameters final` says; None where it is no key that is known."""
+    if kind == b"[" and parameters == "" and final in (b"I", b"O"):
         return Key(FOCUS_IN if final == b"I" else FOCUS_OUT)
     if final == b"u" and parameters.startswith("?"):
         return Key(TELLS_RELEASES)

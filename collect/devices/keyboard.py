@@ -8,13 +8,13 @@ import select
 import sys
 import time
 from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
 
 from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.key_bytes import (
     FOCUS_IN,
     FOCUS_OUT,
     INTERRUPT,
-    STOPS,
     TELLS_RELEASES,
     THERE,
     Key,
@@ -28,6 +28,7 @@ _ASKS = 0.05  # a terminal is asked that often whether it is there [s]
 _SILENCE = 0.15  # without an answer, nobody is there [s]
 _WAIT = 0.008  # for keys [s]
 _AT_ONCE = 4096  # bytes
+_IN_BETWEEN = {"TMUX", "STY", "ZELLIJ"}  # variables of programs that answer in a terminal's place
 _KEYS_BEGIN = b"\x1b[>11u"  # kitty's keyboard protocol: every key, when it goes down and up
 _KEYS_END = b"\x1b[<u"
 _FOCUS_BEGIN, _FOCUS_END = b"\x1b[?1004h", b"\x1b[?1004l"  # the terminal says when it is left
@@ -113,6 +114,7 @@ class KeyTerminal:
         self._file, self._tells_releases = -1, False
 
 
+@dataclass
 class Keyboard:
     """The keys of a terminal; a device.
 
@@ -128,39 +130,37 @@ class Keyboard:
         supervises: whether something else moves the robot while nothing is held.
     """
 
+    terminal: KeyTerminal = field(default_factory=KeyTerminal)
+    clock: Callable[[], float] = time.monotonic
+    stops: Collection[str] = ("space",)
+    supervises: bool = False
     name = "keyboard"
-
-    def __init__(
-        self,
-        terminal: KeyTerminal | None = None,
-        clock: Callable[[], float] = time.monotonic,
-        stops: Collection[str] = STOPS,
-        supervises: bool = False,
-    ) -> None:
-        self._terminal, self._clock = terminal or KeyTerminal(), clock
-        self._stops, self._supervises = stops, supervises
 
     def open(self) -> None:
         """Take the terminal."""
-        self._bytes = KeyBytes(self._stops)
+        self._bytes = KeyBytes(self.stops)
         self._held: dict[str, float] = {}
         self._last = "", 0.0  # key that came, and when [s]
         self._tells_releases, self._in_focus = False, True
         self._heard = self._asked = self._round_trip = 0.0
         self._waits = False  # for an answer
-        self._terminal.open()
+        if self.supervises and _IN_BETWEEN & os.environ.keys():
+            raise HandrailError(
+                "keyboard beside --policy: expected a terminal itself, got tmux or the like; start it outside"
+            )
+        self.terminal.open()
 
     def read(self) -> DeviceInput:
         """Return the keys that are held."""
-        data = self._terminal.read(_WAIT)
-        now = self._clock()
-        if data:
-            self._answered(now)
+        data = self.terminal.read(_WAIT)
+        now = self.clock()
+        if data and self._waits:
+            self._round_trip, self._waits = now - self._asked, False
+        self._heard = now if data else self._heard
         presses = [key.name for key in self._bytes.take(data, now) if self._takes(key, now)]
         if not self._tells_releases:
             self._held = {name: since for name, since in self._held.items() if now - since <= HELD}
-        must_answer = self._supervises or (self._tells_releases and bool(self._held))
-        silent = must_answer and self._is_silent(now)
+        silent = (self.supervises or (self._tells_releases and bool(self._held))) and self._is_silent(now)
         return DeviceInput(
             self._heard if silent else now,
             dict.fromkeys(self._held, 1.0),
@@ -171,7 +171,7 @@ class Keyboard:
 
     def close(self) -> None:
         """Put the terminal back as it was."""
-        self._terminal.close()
+        self.terminal.close()
 
     def _takes(self, key: Key, now: float) -> bool:
         """Take a key; return whether it was pressed now."""
@@ -179,7 +179,7 @@ class Keyboard:
             _thread.interrupt_main()
         elif key.name == TELLS_RELEASES:
             self._tells_releases = True
-            self._terminal.tell_releases()
+            self.terminal.tell_releases()
         elif key.name in (FOCUS_IN, FOCUS_OUT):
             self._in_focus = key.name == FOCUS_IN
             self._held.clear()
@@ -189,17 +189,12 @@ class Keyboard:
             last, before = self._last
             self._last, self._held[key.name] = (key.name, now), now
             again = not self._tells_releases and key.name == last and now - before < _AGAIN
-            return key.name in self._stops or (key.change == "down" and not again)
+            return key.name in self.stops or (key.change == "down" and not again)
         return False
 
     def _is_silent(self, now: float) -> bool:
         """Whether the terminal does not answer any more; ask it."""
         if not self._waits and now - self._asked >= _ASKS:
             self._asked, self._waits = now, True
-            self._terminal.write(ARE_YOU_THERE)
+            self.terminal.write(ARE_YOU_THERE)
         return self._waits and now - self._asked > _SILENCE
-
-    def _answered(self, now: float) -> None:
-        if self._waits:
-            self._round_trip, self._waits = now - self._asked, False
-        self._heard = now

@@ -1,6 +1,5 @@
 """The operators with a device at this computer, by the names of the command line."""
 
-import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 
@@ -32,7 +31,6 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 
 Say = Callable[[str], None]
-_MULTIPLEXERS = {"TMUX": "tmux", "STY": "screen", "ZELLIJ": "zellij"}  # by the variable that each sets
 
 
 def open_device(
@@ -73,15 +71,21 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     return person
 
 
-def _reader(name: str, teleop: TeleopConfig, hands: int, supervises: bool = False) -> DeviceReader:
-    """Return the reader of a device, with the map of the settings for so many hands."""
+def _reader(name: str, teleop: TeleopConfig, hands: int, shared: bool = False) -> DeviceReader:
+    """Return the reader of a device, with the map of the settings for so many hands.
+
+    Beside a policy nobody supervises with nothing held, unless what they have in hand answers.
+    """
     shape = StickShape(teleop.dead_zone, teleop.exponent)
     known = {"gamepad": gamepad.CONTROLS, "spacemouse": spacemouse.CONTROLS, "keyboard": NAMES}[name]
     controls = load_map(name, known, teleop.map, hands)
+    alone = shared and HOLD not in controls.actions.values()
+    if alone and name != "keyboard":
+        raise HandrailError(f'{name} beside --policy: expected a control to "hold" (--teleop.map), got none')
     device = {
         "gamepad": Gamepad(shape),
         "spacemouse": SpaceMice(shape) if hands > 1 else SpaceMouse(shape),
-        "keyboard": Keyboard(stops=controls.stops, supervises=supervises),
+        "keyboard": Keyboard(stops=controls.stops, supervises=alone),
     }[name]
     return DeviceReader(device, controls)
 
@@ -95,10 +99,8 @@ def _person(
     follower: Follower | None = None,
 ) -> LocalPerson:
     """Return the person, their devices opened; where one cannot be, those before are given back."""
-    alone = bool(config.policy) and not control_of([main.controls], HOLD)  # with no dead-man to let go of
-    if alone:
-        _check_answers(config, beside if beside and follower else main, bool(follower))
-    person = Person(env.model, modes, config.mode_name, supervises=alone)
+    alone = config.policy and not control_of([main.controls], HOLD)  # with no dead-man to let go of
+    person = Person(env.model, modes, config.mode_name, supervises=bool(alone))
     person.ask(Ask("frame", "base"))
     with ExitStack() as stack:
         for reader in filter(None, (main, beside)):
@@ -106,22 +108,6 @@ def _person(
             reader.start()
         stack.pop_all()
     return LocalPerson(person, main, beside, follower)
-
-
-def _check_answers(config: RecordConfig, steers: DeviceReader, leads: bool) -> None:
-    """Check that who supervises a policy with nothing held has a device that says whether it is there."""
-    where, is_keyboard = f"--operator {config.operator} beside --policy", isinstance(steers.device, Keyboard)
-    if not (is_keyboard or leads):
-        raise HandrailError(
-            f"{where}: expected a control to hold while the policy drives, found none; give one the action "
-            '"hold" with --teleop.map, or say --operator gamepad'
-        )
-    within = next((name for variable, name in _MULTIPLEXERS.items() if variable in os.environ), "")
-    if is_keyboard and within:
-        raise HandrailError(
-            f"{where}: expected a terminal that falls silent when its connection hangs, got {within}, which "
-            "answers in its place; start it outside, or say --operator gamepad"
-        )
 
 
 def _led(modes: Mapping[str, TeleopMode], env: HandrailEnv, first: str) -> dict[str, TeleopMode]:

@@ -85,33 +85,39 @@ class SharedOperator:
             self._held[:] = True
             self._take_grippers(asked, self._held, view.state.time)
             return replace(asked, grippers=tuple(self._closed))
-        return self._merged(person, wanted, view)
+        return self._merged(person, *wanted, view)
 
     def _makes_sense(self, intent: Intent) -> bool:
         fits = intent.values.shape == (self._channels.size,)
         return fits and intent.is_finite and intent.frames.are_known
 
-    def _wanted(self, view: View) -> list[Intent]:
-        """Return what the policy wants, now and later; nothing of one that no controller accepts, or is old."""
-        now = self._policy.act(view).of_hands(self._hands)
-        plan = [now, *self._policy.chunk()]
-        usable = all(self._makes_sense(each) and are_finite(each.values[now.mask]) for each in plan)
-        if not usable or view.state.time - now.time > DEAD_MAN_TIME:
-            return []
-        turned = [in_usual_frames(each, self._model, view.state.q) for each in plan]
-        return [each for each in turned if each] if all(turned) else []
+    def _wanted(self, view: View) -> tuple[Intent | None, Preview | None]:
+        """Return what the policy wants, and what it has planned, if it plans ahead.
 
-    def _merged(self, person: Intent, plan: list[Intent], view: View) -> Intent:
+        None of an answer or a plan that no controller accepts, or of an old one.
+        """
+        now, later = self._policy.act(view).of_hands(self._hands), self._policy.chunk()
+        plan = [now, *later]
+        usable = all(self._makes_sense(each) and are_finite(each.values[now.mask]) for each in plan)
+        is_old = view.state.time - now.time > DEAD_MAN_TIME
+        wanted = in_usual_frames(now, self._model, view.state.q) if usable and not is_old else None
+        if wanted is None or not later:
+            return wanted, None
+        plan[0] = wanted
+        return wanted, Preview(
+            np.array([each.values for each in plan]), np.array([each.time for each in plan])
+        )
+
+    def _merged(self, person: Intent, policy: Intent | None, ahead: Preview | None, view: View) -> Intent:
         """Return the sum of both, by the arbiter's weights."""
-        time, policy = view.state.time, plan[0] if plan else None
+        time = view.state.time
         realised = channel_matrix(self._model, self._channels, view.state.q) @ view.state.v
         shares = self._arbiter.shares(Wishes(time, person, policy, realised, self._policy.doubt))
         owned, free = person.mask & (shares.person > 0.0), shares.policy > 0.0
         held = owned | ~free
         if np.any(self._held & ~held):  # handed back: what was planned before led from elsewhere
             self._policy.replan()
-            plan = self._wanted(view)
-            policy = plan[0] if plan else None
+            policy, ahead = self._wanted(view)
         self._held = held
         drives = policy is not None and bool(np.any(policy.mask & free))
         mine = [own or not drives for own in self._take_grippers(person, owned, time)]
@@ -120,7 +126,7 @@ class SharedOperator:
             wanted = zip(self._closed, policy.grippers, mine, strict=True)
             self._closed = [now if own else then for now, then, own in wanted]
             policy = replace(policy, mode=person.mode)
-            sources.append(IntentSource(POLICY, policy, shares.policy, _ahead(plan)))
+            sources.append(IntentSource(POLICY, policy, shares.policy, ahead))
         intents = Intents.of(sources, tuple(self._closed), person)
         fresh = min(intents.time, person.time) if intents.mask.any() else LONG_AGO
         return replace(intents, time=fresh, of_grippers=tuple(PERSON if own else POLICY for own in mine))
@@ -137,10 +143,3 @@ class SharedOperator:
                 self._closed[hand] = 1.0 - level if same else level
                 self._changed[hand] = time
         return [own or abs(time - then) < HANDBACK for own, then in zip(has, self._changed, strict=True)]
-
-
-def _ahead(plan: list[Intent]) -> Preview | None:
-    """Return what is planned, if that is more than now."""
-    if len(plan) == 1:
-        return None
-    return Preview(np.array([each.values for each in plan]), np.array([each.time for each in plan]))
