@@ -82,6 +82,11 @@ class ControlMap:
     actions: Mapping[str, str]
     """By control."""
 
+    @property
+    def stops(self) -> frozenset[str]:
+        """Controls of the emergency stop."""
+        return frozenset(name for name, action in self.actions.items() if action == STOP)
+
     def meant(self, said: DeviceInput, presses: Iterable[str], moves: Moves) -> DeviceInput:
         """Return an input in the words of the map: channels instead of axes, actions instead of presses.
 
@@ -99,7 +104,7 @@ class ControlMap:
             meant[HOLD] = 1.0
         for control, (axis, sign) in moves.items() if HOLD in meant else ():
             meant[axis] = meant.get(axis, 0.0) + sign * said.deflections.get(control, 0.0)
-        free = [name for name in presses if name in actions and (name not in moves or actions[name] == STOP)]
+        free = [name for name in presses if name in actions and (name not in moves or name in self.stops)]
         asked = tuple(actions[name] for name in free)
         return replace(said, deflections=meant, presses=asked)
 

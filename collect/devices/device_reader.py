@@ -60,10 +60,11 @@ class DeviceReader:
         self._bank = (self._bank % size + 1) % size
         return self._bank == 0
 
-    def input(self, steered: Steered) -> DeviceInput | None:
-        """Return what the device says now in the words of its map; None while it is gone."""
+    def input(self, steered: Steered) -> tuple[DeviceInput | None, tuple[str, ...]]:
+        """Return what the device says now in the words of its map, none while it is gone, and all it asks."""
         newest, presses = self.take()
-        return self.controls.meant(newest, presses, self.moves(steered)) if newest else None
+        meant = self.controls.meant(newest or DeviceInput(0.0), presses, self.moves(steered))
+        return meant if newest else None, meant.presses
 
     def close(self) -> None:
         """Give the device back."""
@@ -95,7 +96,8 @@ class DeviceReader:
         if not isinstance(error, HandrailError):
             said = f"{self.device.name}: {said}; check it and its cable, then press start"
         with self._lock:
-            self._newest, self._presses, self.trouble = None, [], said
+            self._newest, self.trouble = None, said
+            self._presses = [name for name in self._presses if name in self.controls.stops]
 
     def _close(self) -> None:
         with suppress(Exception):  # of a device that is gone anyway

@@ -7,7 +7,8 @@ import os
 import select
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
 
 from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.key_bytes import (
@@ -23,10 +24,11 @@ from handrail.controllers.errors import HandrailError
 
 HELD = 0.2  # after its last character, a key of a terminal that does not tell releases counts as let go [s]
 _AGAIN = 0.7  # what comes earlier is a repetition, whose first one comes after 0.25 to 0.66 s [s]
-_ASKS = 0.05  # while keys are held, a terminal is asked that often whether it is there [s]
+_ASKS = 0.05  # a terminal is asked that often whether it is there [s]
 _SILENCE = 0.15  # without an answer, nobody is there [s]
 _WAIT = 0.008  # for keys [s]
 _AT_ONCE = 4096  # bytes
+_IN_BETWEEN = {"TMUX", "STY", "ZELLIJ"}  # variables of programs that answer in a terminal's place
 _KEYS_BEGIN = b"\x1b[>11u"  # kitty's keyboard protocol: every key, when it goes down and up
 _KEYS_END = b"\x1b[<u"
 _FOCUS_BEGIN, _FOCUS_END = b"\x1b[?1004h", b"\x1b[?1004l"  # the terminal says when it is left
@@ -112,46 +114,53 @@ class KeyTerminal:
         self._file, self._tells_releases = -1, False
 
 
+@dataclass
 class Keyboard:
     """The keys of a terminal; a device.
 
     Most terminals tell only characters: a key that is held comes again and again, the first time after about
     half a second. A key counts as held for 0.2 s after each. Terminals with kitty's keyboard protocol tell
     when keys go up; these are asked 20 times a second whether they are still there, so that a connection that
-    hangs is no key that is held.
+    hangs is no key that is held. So is every terminal beside something else that moves the robot.
 
     Args:
         terminal: the one to read.
         clock: of readings [s].
+        stops: keys of the emergency stop: no rule keeps them back.
+        supervises: whether something else moves the robot while nothing is held.
     """
 
+    terminal: KeyTerminal = field(default_factory=KeyTerminal)
+    clock: Callable[[], float] = time.monotonic
+    stops: Collection[str] = ("space",)
+    supervises: bool = False
     name = "keyboard"
-
-    def __init__(
-        self, terminal: KeyTerminal | None = None, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._terminal, self._clock = terminal or KeyTerminal(), clock
 
     def open(self) -> None:
         """Take the terminal."""
-        self._bytes = KeyBytes()
+        self._bytes = KeyBytes(self.stops)
         self._held: dict[str, float] = {}
-        self._last: dict[str, float] = {}
+        self._last = "", 0.0  # key that came, and when [s]
         self._tells_releases, self._in_focus = False, True
         self._heard = self._asked = self._round_trip = 0.0
         self._waits = False  # for an answer
-        self._terminal.open()
+        if self.supervises and _IN_BETWEEN & os.environ.keys():
+            raise HandrailError(
+                "keyboard beside --policy: expected a terminal itself, got tmux or the like; start it outside"
+            )
+        self.terminal.open()
 
     def read(self) -> DeviceInput:
         """Return the keys that are held."""
-        data = self._terminal.read(_WAIT)
-        now = self._clock()
-        if data:
-            self._answered(now)
+        data = self.terminal.read(_WAIT)
+        now = self.clock()
+        if data and self._waits:
+            self._round_trip, self._waits = now - self._asked, False
+        self._heard = now if data else self._heard
         presses = [key.name for key in self._bytes.take(data, now) if self._takes(key, now)]
         if not self._tells_releases:
             self._held = {name: since for name, since in self._held.items() if now - since <= HELD}
-        silent = self._tells_releases and bool(self._held) and self._is_silent(now)
+        silent = (self.supervises or (self._tells_releases and bool(self._held))) and self._is_silent(now)
         return DeviceInput(
             self._heard if silent else now,
             dict.fromkeys(self._held, 1.0),
@@ -162,7 +171,7 @@ class Keyboard:
 
     def close(self) -> None:
         """Put the terminal back as it was."""
-        self._terminal.close()
+        self.terminal.close()
 
     def _takes(self, key: Key, now: float) -> bool:
         """Take a key; return whether it was pressed now."""
@@ -170,26 +179,22 @@ class Keyboard:
             _thread.interrupt_main()
         elif key.name == TELLS_RELEASES:
             self._tells_releases = True
-            self._terminal.tell_releases()
+            self.terminal.tell_releases()
         elif key.name in (FOCUS_IN, FOCUS_OUT):
             self._in_focus = key.name == FOCUS_IN
             self._held.clear()
         elif key.change == "up":
             self._held.pop(key.name, None)
         elif key.name != THERE:
-            before = self._last.get(key.name, -_AGAIN)
-            self._last[key.name] = self._held[key.name] = now
-            return key.change == "down" and (self._tells_releases or now - before >= _AGAIN)
+            last, before = self._last
+            self._last, self._held[key.name] = (key.name, now), now
+            again = not self._tells_releases and key.name == last and now - before < _AGAIN
+            return key.name in self.stops or (key.change == "down" and not again)
         return False
 
     def _is_silent(self, now: float) -> bool:
         """Whether the terminal does not answer any more; ask it."""
         if not self._waits and now - self._asked >= _ASKS:
             self._asked, self._waits = now, True
-            self._terminal.write(ARE_YOU_THERE)
-        return now - self._heard > _SILENCE
-
-    def _answered(self, now: float) -> None:
-        if self._waits:
-            self._round_trip, self._waits = now - self._asked, False
-        self._heard = now
+            self.terminal.write(ARE_YOU_THERE)
+        return self._waits and now - self._asked > _SILENCE

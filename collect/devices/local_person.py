@@ -100,9 +100,9 @@ class LocalPerson:
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
         said = [source.input(self._steered) for source in self._sources]
-        for action in (action for heard in said if heard for action in heard.presses):
+        for action in (action for _, actions in said for action in actions):
             self._do(action)
-        self._take(said[0], said[-1] if self._follower else said[0], view)
+        self._take(said[0][0], said[-1 if self._follower else 0][0], view)
         answer, card = self._person.act(view), self._card
         moving = self._sources[-1] if self._follower else self._main
         card.view, card.moves, card.grips = view, moving.moves(self._steered), tuple(self._grips)

@@ -47,7 +47,7 @@ def open_device(
         modes: that one can change to; all by default.
     """
     hands = len(env.model.description.hands)
-    main, beside = _reader(config.operator, config.teleop, hands), None
+    main, beside = _reader(config.operator, config.teleop, hands, bool(config.policy)), None
     if config.operator != "keyboard" and has_terminal():
         beside = _reader("keyboard", TeleopConfig(), hands)
         beside.controls = beside.controls.only()
@@ -64,22 +64,30 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     twin = None if file.is_file() else same_arm(teleop, arm)
     calibration = twin or load_calibration(file, arm, how_to_calibrate(teleop, config.robot))
     main = DeviceReader(LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources))
-    beside = _reader(teleop.beside, teleop, len(description.hands))
+    beside = _reader(teleop.beside, teleop, len(description.hands), bool(config.policy))
     beside.controls = beside.controls.only("base")
     person = _person(config, env, modes, main, beside, Follower(env.model, calibration))
     say(f"{teleop.type}: hold {control_of([beside.controls], CLUTCH)} on the {teleop.beside} to move the arm")
     return person
 
 
-def _reader(name: str, teleop: TeleopConfig, hands: int) -> DeviceReader:
-    """Return the reader of a device, with the map of the settings for so many hands."""
+def _reader(name: str, teleop: TeleopConfig, hands: int, shared: bool = False) -> DeviceReader:
+    """Return the reader of a device, with the map of the settings for so many hands.
+
+    Beside a policy nobody supervises with nothing held, unless what they have in hand answers.
+    """
     shape = StickShape(teleop.dead_zone, teleop.exponent)
-    device, controls = {
-        "gamepad": (Gamepad(shape), gamepad.CONTROLS),
-        "spacemouse": (SpaceMice(shape) if hands > 1 else SpaceMouse(shape), spacemouse.CONTROLS),
-        "keyboard": (Keyboard(), NAMES),
+    known = {"gamepad": gamepad.CONTROLS, "spacemouse": spacemouse.CONTROLS, "keyboard": NAMES}[name]
+    controls = load_map(name, known, teleop.map, hands)
+    alone = shared and HOLD not in controls.actions.values()
+    if alone and name != "keyboard":
+        raise HandrailError(f'{name} beside --policy: expected a control to "hold" (--teleop.map), got none')
+    device = {
+        "gamepad": Gamepad(shape),
+        "spacemouse": SpaceMice(shape) if hands > 1 else SpaceMouse(shape),
+        "keyboard": Keyboard(stops=controls.stops, supervises=alone),
     }[name]
-    return DeviceReader(device, load_map(name, controls, teleop.map, hands))
+    return DeviceReader(device, controls)
 
 
 def _person(

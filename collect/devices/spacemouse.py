@@ -66,12 +66,11 @@ class SpaceMouse:
     def read(self) -> DeviceInput:
         """Return its axes and buttons."""
         presses: list[str] = []
-        report = self._hid.read(64, _WAIT)
-        for _ in range(_MOST_REPORTS):
-            if not report:
+        for number in range(_MOST_REPORTS):
+            report = self._hid.read(64, 0 if number else _WAIT)
+            presses += self._take(bytes(report)) if report else []
+            if presses or not report:  # what was pressed is said before a reading that may fail
                 break
-            presses += self._take(bytes(report))
-            report = self._hid.read(64, 0)
         now = self._clock()
         silent = any(self._axes.values()) and now - self._heard > _SILENCE
         held = {name: value for name, value in self._axes.items() if value} | dict.fromkeys(self._down, 1.0)

@@ -62,12 +62,13 @@ class Fake:
     age: float = 0.0
     doubt: float = 0.0
     calls: list = field(default_factory=list)
+    plans: list = field(default_factory=list)
 
     def reset(self, view, rng):
         self.calls.append("reset")
 
     def chunk(self):
-        return []
+        return self.plans
 
     def replan(self):
         self.calls.append("replan")

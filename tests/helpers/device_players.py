@@ -146,7 +146,7 @@ class PlayedReader(DeviceReader):
     def take(self) -> tuple[DeviceInput | None, tuple[str, ...]]:
         presses, self.presses = tuple(self.presses), []
         if self.gone:
-            return None, ()
+            return None, presses
         time = self._clock() if self.time is None else self.time
         values = {name: value for name, value in self.values.items() if value}
         return DeviceInput(time, values, presses, self.attended, dict(self.joints)), presses

@@ -18,7 +18,7 @@ from handrail.collect.operators.operator import EpisodeEvent, Operator, View
 from handrail.collect.operators.shared.arbiter import Arbiter, Groups, Wishes
 from handrail.collect.operators.shared.planning import Planner
 from handrail.collect.operators.shared.settings import HANDBACK
-from handrail.controllers.arrays import BoolArray
+from handrail.controllers.arrays import BoolArray, are_finite
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO, Intent
@@ -78,24 +78,37 @@ class SharedOperator:
             self._waits = False
         asked = asked.of_hands(self._hands)
         wanted = self._wanted(view)
-        if not (asked.is_finite and asked.values.shape == (self._channels.size,) and asked.frames.are_known):
+        if not self._makes_sense(asked):
             return asked  # the controller brakes
         person = in_usual_frames(asked, self._model, view.state.q)
         if person is None or not self._shares(asked.mode):
             self._held[:] = True
             self._take_grippers(asked, self._held, view.state.time)
             return replace(asked, grippers=tuple(self._closed))
-        return self._merged(person, wanted, view)
+        return self._merged(person, *wanted, view)
 
-    def _wanted(self, view: View) -> Intent | None:
-        """Return what the policy wants; None of an answer that no controller accepts, or an old one."""
-        wanted = self._policy.act(view).of_hands(self._hands)
-        fits = wanted.values.shape == (self._channels.size,) and wanted.is_finite and wanted.frames.are_known
-        if not fits or view.state.time - wanted.time > DEAD_MAN_TIME:
-            return None
-        return in_usual_frames(wanted, self._model, view.state.q)
+    def _makes_sense(self, intent: Intent) -> bool:
+        fits = intent.values.shape == (self._channels.size,)
+        return fits and intent.is_finite and intent.frames.are_known
 
-    def _merged(self, person: Intent, policy: Intent | None, view: View) -> Intent:
+    def _wanted(self, view: View) -> tuple[Intent | None, Preview | None]:
+        """Return what the policy wants, and what it has planned, if it plans ahead.
+
+        None of an answer or a plan that no controller accepts, or of an old one.
+        """
+        now, later = self._policy.act(view).of_hands(self._hands), self._policy.chunk()
+        plan = [now, *later]
+        usable = all(self._makes_sense(each) and are_finite(each.values[now.mask]) for each in plan)
+        is_old = view.state.time - now.time > DEAD_MAN_TIME
+        wanted = in_usual_frames(now, self._model, view.state.q) if usable and not is_old else None
+        if wanted is None or not later:
+            return wanted, None
+        plan[0] = wanted
+        return wanted, Preview(
+            np.array([each.values for each in plan]), np.array([each.time for each in plan])
+        )
+
+    def _merged(self, person: Intent, policy: Intent | None, ahead: Preview | None, view: View) -> Intent:
         """Return the sum of both, by the arbiter's weights."""
         time = view.state.time
         realised = channel_matrix(self._model, self._channels, view.state.q) @ view.state.v
@@ -104,7 +117,7 @@ class SharedOperator:
         held = owned | ~free
         if np.any(self._held & ~held):  # handed back: what was planned before led from elsewhere
             self._policy.replan()
-            policy = self._wanted(view)
+            policy, ahead = self._wanted(view)
         self._held = held
         drives = policy is not None and bool(np.any(policy.mask & free))
         mine = [own or not drives for own in self._take_grippers(person, owned, time)]
@@ -113,17 +126,10 @@ class SharedOperator:
             wanted = zip(self._closed, policy.grippers, mine, strict=True)
             self._closed = [now if own else then for now, then, own in wanted]
             policy = replace(policy, mode=person.mode)
-            sources.append(IntentSource(POLICY, policy, shares.policy, self._ahead(policy)))
+            sources.append(IntentSource(POLICY, policy, shares.policy, ahead))
         intents = Intents.of(sources, tuple(self._closed), person)
         fresh = min(intents.time, person.time) if intents.mask.any() else LONG_AGO
         return replace(intents, time=fresh, of_grippers=tuple(PERSON if own else POLICY for own in mine))
-
-    def _ahead(self, now: Intent) -> Preview | None:
-        """Return what the policy has planned, if it plans ahead."""
-        plan = [now, *self._policy.chunk()]
-        if len(plan) == 1:
-            return None
-        return Preview(np.array([each.values for each in plan]), np.array([each.time for each in plan]))
 
     def _take_grippers(self, person: Intent, owned: BoolArray, time: float) -> list[bool]:
         """Do what the person says of the grippers; return which are theirs. A script means what it says."""

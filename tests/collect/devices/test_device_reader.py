@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from handrail.collect.devices.control_map import ControlMap, Steered
 from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.device_reader import DeviceReader
 from handrail.controllers.errors import HandrailError
@@ -90,6 +91,23 @@ def test_what_was_pressed_before_it_was_gone_is_forgotten(device, poller):
     device.trouble = HandrailError("lever: unplugged")
     eventually(lambda: poller.trouble)
     assert poller.take() == (None, ())
+
+
+def test_a_stop_before_it_was_gone_is_handed_on_once(device):
+    """However long the loop did not look: an episode was being saved."""
+    controls = ControlMap({"hand": {"red": ("ee.vx", 1)}}, {"red": "stop", "green": "success"})
+    reader = DeviceReader(device, controls, retry=0.01)
+    device.readings = [DeviceInput(0.0, presses=("green", "red", "green"))]
+    reader.start()
+    eventually(lambda: not device.readings)
+    device.trouble = HandrailError("lever: unplugged")
+    eventually(lambda: reader.trouble)
+    steered = Steered(hand=True, base=False)
+    assert reader.input(steered) == (None, ("stop",))
+    device.trouble = None
+    eventually(lambda: reader.take()[0] is not None)
+    assert reader.input(steered)[1] == ()
+    reader.close()
 
 
 @pytest.mark.parametrize("error", [HandrailError("lever: expected one, found none"), OSError("no such port")])

@@ -69,6 +69,8 @@ def test_a_plain_terminal(keys, terminal, clock):
         (2.4, "tab"),
         (2.6, "space"),
         (3.4, "w"),
+        (3.6, "space"),  # of what is pasted the stop counts: it could as well have been typed
+        (3.6, "space"),
     ]
     assert not readings[3.1].attended  # another window has the focus
     assert readings[3.2].attended
@@ -99,12 +101,46 @@ def test_a_terminal_that_hangs_is_no_key_that_is_held(keys, terminal, clock):
         assert answered.attended
         assert answered.round_trip == pytest.approx(0.08)  # since it was asked
     heard = clock.now
-    for _ in range(17):
+    for _ in range(20):
         clock.now += 0.01
         reading = keys.read()
     assert reading.deflections == {"w": 1.0}
     assert not reading.attended
     assert reading.time == heard
+
+
+@pytest.mark.parametrize("tells", [b"", b"\x1b[?0u"])
+def test_while_a_policy_drives_a_terminal_says_all_the_time_that_it_is_there(terminal, clock, tells):
+    """Nothing is held, and a connection that hangs is nobody; what comes again is somebody."""
+    keys = Keyboard(terminal, clock, supervises=True)
+    keys.open()
+    terminal.bytes = [tells]
+    for _ in range(100):
+        clock.now += 0.01
+        if terminal.written.count(b"\x1b[5n"):
+            terminal.bytes.append(b"\x1b[0n")
+            terminal.written = b""
+        assert keys.read().attended
+    keys.read()
+    heard = clock.now
+    for _ in range(21):
+        clock.now += 0.01
+        reading = keys.read()
+    assert (reading.attended, reading.deflections) == (False, {})
+    assert reading.time <= heard
+    assert terminal.written.count(b"\x1b[5n") == 1, "a link that hangs is not filled"
+    terminal.bytes = [b"\x1b[0n"]
+    assert keys.read().attended
+
+
+def test_a_computer_that_was_busy_is_no_terminal_that_hangs(terminal, clock):
+    keys = Keyboard(terminal, clock, supervises=True)
+    keys.open()
+    for _ in range(3):
+        clock.now += 10.0
+        terminal.bytes = [b"", b"\x1b[0n"]
+        assert keys.read().attended
+        assert keys.read().attended
 
 
 def test_the_release_of_a_plain_terminal_is_seen_well_before_the_brake_is_due():
@@ -156,3 +192,52 @@ def test_what_is_pasted_is_not_typed():
     taken = KeyBytes()
     assert taken.take(b"wwwwwwwwwwwwwwwww", 0.0) == []
     assert taken.take(b"w", 1.0) == [Key("w")]
+
+
+BURSTS = {  # after a link has stalled, all comes at once
+    "while a key is held": b"wwwwwwww ",
+    "again and again": b" " * 9,
+    "in what is pasted": b"rm -rf everything\r",
+    "after Escape": b"\x1b ",
+    "with Control": b"\x00",
+    "after a sequence that broke off": b"\x1b[ ",
+    "in the midst of one": b"\x1b[1;2 w",
+    "after another": b"\x1bO ",
+    "with Control, as kitty says it": b"\x1b[32;5u",
+    "with Alt, as kitty says it": b"\x1b[32;3u",
+}
+
+
+@pytest.mark.parametrize("burst", BURSTS)
+def test_no_rule_keeps_back_the_stop(terminal, clock, burst):
+    keys = Keyboard(terminal, clock)
+    keys.open()
+    terminal.bytes = [BURSTS[burst]]
+    assert "space" in keys.read().presses
+
+
+def test_a_stop_on_another_key_is_not_kept_back_either(terminal, clock):
+    keys = Keyboard(terminal, clock, stops={"b"})
+    keys.open()
+    for burst in (b"wwwwwwwwb", b"\x1bb", b"\x1b[98;5u"):
+        terminal.bytes = [burst]
+        assert keys.read().presses == ("b",)
+    terminal.bytes = [b"wwwwwwww ", b"\x1b "]
+    assert [keys.read().presses, keys.read().presses] == [(), ()]
+
+
+@pytest.mark.parametrize(
+    ("typed", "wanted"),
+    [
+        ([(0.0, " "), (0.4, " "), (0.6, "\r"), (1.05, " ")], [" ", " ", "\r", " "]),  # never a repetition
+        ([(0.0, "p"), (0.3, "\r"), (0.6, "p")], ["p", "\r", "p"]),  # another one came between
+        ([(0.0, "y"), (0.3, "y"), (0.6, "y"), (1.4, "y")], ["y", "y"]),
+    ],
+)
+def test_what_a_plain_terminal_repeats_is_the_key_that_came_last(keys, terminal, clock, typed, wanted):
+    start, seen = clock.now, []
+    for time, character in typed:
+        clock.now = start + time
+        terminal.bytes = [character.encode()]
+        seen += keys.read().presses
+    assert seen == [{" ": "space", "\r": "enter"}.get(each, each) for each in wanted]

@@ -71,7 +71,7 @@ def test_what_moves_something_asks_for_nothing_but_the_stop():
     assert intent.grippers == (0.0, 0.0)
     assert intent.raw.values.any()
     table = load_map("gamepad", CONTROLS["gamepad"])
-    stop = table.meant(driven.main.input(Steered(True, False)), ["b"], {"b": ("ee.vx", 1)})
+    stop = table.meant(driven.main.input(Steered(True, False))[0], ["b"], {"b": ("ee.vx", 1)})
     assert stop.presses == ("stop",)
 
 

@@ -1,15 +1,22 @@
 """Laws of a person at this computer: hold to move, brake at any doubt, start anew only after a release."""
 
 import re
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from device_players import PlayedTerminal
 from driven_person import CHANNELS, FORWARD, MODEL, START, Driven
 
+from handrail.collect.config import RecordConfig
+from handrail.collect.devices.keyboard import Keyboard
+from handrail.collect.devices.open_devices import open_device
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.operators.person.inputs import Ask
 from handrail.collect.operators.person.person import Phase
+from handrail.collect.teleop_config import TeleopConfig
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.registry import fitting
 
@@ -128,6 +135,20 @@ def test_the_stop_and_its_release(device):
     assert isinstance(driven.act(), Intent)
 
 
+@pytest.mark.parametrize("beside", ["", "keyboard"])
+def test_a_stop_is_heard_though_its_device_is_gone_since(beside):
+    driven = Driven("gamepad", beside=beside)
+    driven.begin()
+    device = driven.beside or driven.main
+    device.presses, device.gone = ["space" if beside else "b"], True
+    assert driven.act() is EpisodeEvent.PAUSE
+    assert driven.person.phase is Phase.STOPPED
+    driven.local.reset(driven.view(), np.random.default_rng(0))
+    device.gone = False
+    driven.person.ask(Ask("start"))
+    assert driven.act() is EpisodeEvent.PAUSE
+
+
 def test_choices_while_driving():
     driven = Driven("keyboard", "switching")
     driven.begin()
@@ -190,3 +211,30 @@ def test_the_way_that_the_card_shows_leads_to_the_goal():
     way = np.array([float(number) for number in re.findall(r"[+-]\d\.\d+", line)[:3]])
     turn = np.array([[np.cos(0.7), -np.sin(0.7), 0.0], [np.sin(0.7), np.cos(0.7), 0.0], [0.0, 0.0, 1.0]])
     assert MODEL.pose(driven.q).position + turn @ way == pytest.approx([1.0, 0.0, 1.0], abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("policy", "actions", "asks"),
+    [
+        ((), 'b = "stop"', False),
+        (("some",), 'b = "stop"', True),
+        (("some",), 'b = "stop"\nv = "hold"', False),  # a key that is held says it, too
+    ],
+)
+def test_the_keys_know_which_stop_and_whether_a_policy_drives(tmp_path, monkeypatch, policy, actions, asks):
+    """Of a person's own table."""
+    made = []
+
+    def keyboard(**settings):
+        made.append(Keyboard(PlayedTerminal(), **settings))
+        return made[-1]
+
+    for name in ("TMUX", "STY", "ZELLIJ"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("handrail.collect.devices.open_devices.Keyboard", keyboard)
+    (tmp_path / "mine.toml").write_text(f"[actions]\n{actions}\n")
+    teleop = TeleopConfig(map=str(tmp_path / "mine.toml"))
+    config = RecordConfig(task="reach", mode="ee", operator="keyboard", policy=policy, teleop=teleop)
+    env: Any = SimpleNamespace(model=MODEL)
+    open_device(config, env, print, fitting(MODES, 1)).close()
+    assert [(keys.stops, keys.supervises) for keys in made] == [({"space", "b"}, asks)]

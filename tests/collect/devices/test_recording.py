@@ -19,6 +19,8 @@ from handrail.collect.devices.local_person import LocalPerson
 from handrail.collect.teleop_config import LeaderConfig
 
 LEADER = ("--operator", "leader_arm", "--teleop.type", "played_leader")
+BESIDE = ("--policy", "none")
+MULTIPLEXERS = ("TMUX", "STY", "ZELLIJ")
 
 
 def frames(folder):
@@ -158,6 +160,8 @@ def test_a_recording_with_a_leader_arm_and_a_gamepad(tmp_path, pad, listens, mon
         ((*LEADER, "--mode", "leader", "--teleop.id", "new"), "expected a calibration of the leader arm for"),
         (("--operator", "spacemouse"), "SpaceMouse: expected one, found none; plug it in"),
         (("--operator", "keyboard"), "keyboard: expected a terminal to read keys from"),
+        (("--operator", "keyboard", *BESIDE), "keyboard: expected a terminal to read keys from"),
+        (("--operator", "spacemouse", *BESIDE), 'spacemouse beside --policy: expected a control to "hold"'),
     ],
 )
 def test_what_cannot_be_is_one_line_and_nothing_is_written(tmp_path, monkeypatch, flags, said):
@@ -165,5 +169,34 @@ def test_what_cannot_be_is_one_line_and_nothing_is_written(tmp_path, monkeypatch
     hid.plugged = False
     monkeypatch.setitem(sys.modules, "hid", hid)
     monkeypatch.setattr(sys, "stdin", io.StringIO())
+    for name in MULTIPLEXERS:
+        monkeypatch.delenv(name, raising=False)
     refused(tmp_path / "dataset", "--task", "reach", *flags, told=said)
     assert not (tmp_path / "dataset").exists()
+
+
+def test_a_spacemouse_with_a_button_to_hold_may_be_beside_a_policy(tmp_path, monkeypatch):
+    """It comes as far as the plug: a person's own dead-man will do."""
+    hid = PlayedHid()
+    hid.plugged = False
+    monkeypatch.setitem(sys.modules, "hid", hid)
+    (tmp_path / "mine.toml").write_text('[actions]\nbutton_1 = "hold"\n')
+    words = ("--operator", "spacemouse", *BESIDE, "--teleop.map", tmp_path / "mine.toml")
+    refused(tmp_path / "dataset", "--task", "reach", *words, told="SpaceMouse: expected one, found none")
+
+
+@pytest.mark.parametrize("name", MULTIPLEXERS)
+@pytest.mark.parametrize("operator", ["keyboard", "leader_arm"])
+def test_what_answers_for_a_terminal_that_hangs_is_refused_beside_a_policy(
+    tmp_path, monkeypatch, name, operator
+):
+    monkeypatch.setenv(name, "/tmp/socket,1,0")
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    monkeypatch.setattr("lerobot.utils.constants.HF_LEROBOT_CALIBRATION", tmp_path / "calibration")
+    save_calibration(CALIBRATION, calibration_file(LeaderConfig(type="played_leader"), "ridgeback_ur10"))
+    flags = ("--operator", operator) if operator == "keyboard" else (*LEADER, "--mode", "joints")
+    refused(
+        tmp_path / "dataset",
+        *("--task", "reach", *flags, *BESIDE),
+        told="keyboard beside --policy: expected a terminal itself, got tmux",
+    )

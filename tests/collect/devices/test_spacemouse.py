@@ -78,6 +78,20 @@ def test_unplugged_it_is_gone_and_says_what_to_do(played, mouse):
         mouse.open()
 
 
+def test_a_press_before_it_was_unplugged_is_said(played, mouse):
+    """Both are waiting when it is read."""
+
+    def read(size, patience):
+        if not played.reports:
+            raise OSError("read error")
+        return list(played.reports.pop(0))
+
+    played.reports, played.read = [b"\x03\x01\x00"], read
+    assert mouse.read().presses == ("button_1",)
+    with pytest.raises(OSError, match="read error"):
+        mouse.read()
+
+
 def test_one_that_may_not_be_read_says_the_rule(played):
     played.allowed = False
     with pytest.raises(HandrailError) as error:

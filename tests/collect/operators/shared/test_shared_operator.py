@@ -93,6 +93,31 @@ def test_an_unusable_policy_leaves_the_person_alone_and_the_robot_at_rest(name, 
     assert status(found, both.time) is Status.STALE_INTENT
 
 
+LATER = {
+    **{name: bad for name, bad in UNUSABLE.items() if name != "too many grippers"},
+    "inf": replace(DRIVES, values=np.full(CHANNELS.size, np.inf)),
+    "NaN of one channel": replace(DRIVES, values=np.where(np.arange(CHANNELS.size), 0.1, np.nan)),
+    "NaN where only that row has no mask": replace(PUSHES, values=np.where(PUSHES.mask, 0.1, np.nan)),
+    "NaN of its time": replace(DRIVES, time=np.nan),
+}
+
+
+@pytest.mark.parametrize("bad", LATER)
+def test_a_plan_with_one_bad_row_is_unusable_as_a_bad_intent_is(bad):
+    """Its last row may be far from now: what a policy says of later is used now."""
+    both = Both()
+    both.policy.plans = [replace(DRIVES, time=0.5 * row) for row in range(1, 40)]
+    found = both.act(RESTS, DRIVES, 1.0)
+    assert status(found, both.time) is Status.OK
+    assert found.source(POLICY).predict is not None
+    both.policy.plans[-1] = LATER[bad]
+    found = both.act(PUSHES)
+    assert [source.name for source in found.sources] == [PERSON]
+    assert status(found, both.time) is Status.OK
+    found = both.act(RESTS, seconds=1.0)
+    assert status(found, both.time) is Status.STALE_INTENT
+
+
 @pytest.mark.parametrize("bad", [*UNUSABLE][:2] + [*UNUSABLE][3:])
 def test_a_person_whose_wish_makes_no_sense_brakes_the_robot(bad):
     both = Both()
