@@ -57,14 +57,16 @@ def _record_here(
     if interactive or config.robot_client:
         come_first()
     with ExitStack() as stack:
-        env = _opened(config, interactive, stack)
+        people: list[Any] = []
+        env = _opened(config, interactive, stack, people)
         displays = _displays(config, console, stack)
         build_mode(config, env.model)  # a wrong mask, or cameras without GL, show before anything is written
-        env.reset(seed=config.seed)
+        if not env.real:  # a robot moves when there is somebody to stop it
+            env.reset(seed=config.seed)
         config = located(config, env)
         if interactive and not config.resume:  # before a person's page is opened, or their device
             check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
-        people = _people(config, env, console, stack)
+        people += _people(config, env, console, stack)
         beside = (lambda person: share(config, person, env)) if share else None
         recording = Recording(config, env, people, displays, beside)
         writer = stack.enter_context(session_writer(config, env))
@@ -120,13 +122,13 @@ def _print_state(writer: EpisodeWriter, console: Terminal) -> None:
         console.print(f"Adds to {writer.root}; episodes there: {writer.num_episodes}")
 
 
-def _opened(config: RecordConfig, interactive: bool, stack: ExitStack) -> HandrailEnv:
-    """Return the environment, with the link to a robot if it is no simulation."""
+def _opened(config: RecordConfig, interactive: bool, stack: ExitStack, people: list[Any]) -> HandrailEnv:
+    """Return the environment, with the link to a robot if it is no simulation; people may stop that."""
     if not config.robot_client:
         return stack.enter_context(closing(build_env(config, config.dataset.fps, render=interactive)))
     from handrail.collect.lekiwi.client_plant import open_client  # loads LeRobot
 
-    env, link = open_client(config)
+    env, link = open_client(config, lambda: people[0].between() if people else None)
     stack.callback(link.close)
     return stack.enter_context(closing(env))
 

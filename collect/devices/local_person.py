@@ -99,15 +99,15 @@ class LocalPerson:
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
-        said = [source.input(self._steered) for source in self._sources]
-        for action in (action for heard in said if heard for action in heard.presses):
-            self._do(action)
-        self._take(said[0], said[-1] if self._follower else said[0], view)
+        self._take(*self._heard(), view)
         answer, card = self._person.act(view), self._card
-        moving = self._sources[-1] if self._follower else self._main
-        card.view, card.moves, card.grips = view, moving.moves(self._steered), tuple(self._grips)
-        card.trouble = self._main.trouble or moving.trouble
+        card.view, card.moves, card.grips = view, self._moving.moves(self._steered), tuple(self._grips)
         return answer
+
+    def between(self) -> EpisodeEvent | None:
+        """Return what holds before an episode begins: QUIT; PAUSE in the e-stop, or if a device is gone."""
+        gone = None in self._heard()
+        return self._person.between or (EpisodeEvent.PAUSE if gone else None)
 
     def see(self, frame: Frame) -> None:
         """Take note of how the controller fared."""
@@ -122,6 +122,19 @@ class LocalPerson:
         """Give the devices back."""
         for source in self._sources:
             source.close()
+
+    @property
+    def _moving(self) -> DeviceReader:
+        """The device with the dead-man."""
+        return self._sources[-1] if self._follower else self._main
+
+    def _heard(self) -> tuple[DeviceInput | None, DeviceInput | None]:
+        """Do what was pressed; return what the main device says, and the one with the dead-man."""
+        said = {source: source.input(self._steered) for source in self._sources}
+        for action in (action for heard in said.values() if heard for action in heard.presses):
+            self._do(action)
+        self._card.trouble = self._main.trouble or self._moving.trouble
+        return said[self._main], said[self._moving]
 
     @property
     def _steered(self) -> Steered:

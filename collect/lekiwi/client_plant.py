@@ -1,7 +1,6 @@
 """A robot behind its LeRobot client, in a world of which nobody tells the truth; a robot and a world."""
 
-import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.config import RecordConfig
 from handrail.collect.lekiwi.link import Link, connect
+from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.plant import Plant
@@ -24,8 +24,6 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import Pose, RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
 
-_MOST_BRAKING = 200  # periods
-
 _GAIN = 2.0  # of a joint towards its place [1/s]
 _SPEED = 0.5  # of a joint, at most [rad/s, m/s]
 _NEAR = 0.04  # that is there [rad, m]
@@ -34,9 +32,22 @@ _CALM = 5  # periods there in a row
 _STUCK = 40  # periods without coming nearer
 _PATIENCE = 20.0  # [s]
 
+Asked = Callable[[], EpisodeEvent | None]
 
-def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) -> None:
-    """Move the arm to its part of q, or as near as it may come to itself; the base stands."""
+
+def _go() -> None:
+    """Say nothing: there is nobody to ask."""
+
+
+def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = (), asked: Asked = _go) -> None:
+    """Move the arm to its part of q, or as near as it may come to itself; the base stands.
+
+    Args:
+        link: to the robot.
+        q: where it shall be, (n,).
+        obstacles: around it, where it has no base.
+        asked: every period: the robot brakes while it says PAUSE, and stays where it is after QUIT.
+    """
     description = link.model.description
     base, channels = len(description.base.joints), Channels.of(description)
     mpc = MaskedMpc(link.model)
@@ -45,6 +56,10 @@ def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) 
     calm = stuck = 0
     nearest = np.inf
     for _ in range(round(_PATIENCE / link.period)):
+        while (event := asked()) is EpisodeEvent.PAUSE:
+            link.exchange(())
+        if event is EpisodeEvent.QUIT:
+            return
         away = (q - link.state.q)[base:]
         farthest = np.abs(away).max()
         calm = calm + 1 if farthest < _NEAR else 0
@@ -62,12 +77,12 @@ def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) 
     )
 
 
-def open_client(config: RecordConfig) -> tuple[HandrailEnv, Link]:
-    """Return the environment of a recording's robot, and the link to it."""
+def open_client(config: RecordConfig, asked: Asked = _go) -> tuple[HandrailEnv, Link]:
+    """Return the environment of a recording's robot, and the link to it; `asked` as in `bring_home`."""
     fps = config.robot_fps or config.dataset.fps
 
     def plant(model: RobotModel, scene: Scene, q: FloatArray, period: float, **looks: Any) -> ClientPlant:
-        return ClientPlant(model, scene, q, link, env.np_random_seed)
+        return ClientPlant(model, scene, q, link, env.np_random_seed, asked)
 
     link = connect(config.robot_client, config.client, config.camera_names, load_model(config.robot), fps)
     try:
@@ -90,14 +105,17 @@ class ClientPlant(Plant):
         q: where it begins, (n,).
         link: to it.
         seed: of the episode.
+        asked: as in `bring_home`.
     """
 
-    def __init__(self, model: RobotModel, scene: Scene, q: FloatArray, link: Link, seed: int) -> None:
+    def __init__(
+        self, model: RobotModel, scene: Scene, q: FloatArray, link: Link, seed: int, asked: Asked = _go
+    ) -> None:
         super().__init__(model, scene)
         self._link = link
         self._collision = CollisionModel(model, scene.obstacles())
         link.begin(seed)
-        bring_home(link, q, scene.obstacles())
+        bring_home(link, q, scene.obstacles(), asked)
         link.body.place(q[: len(model.description.base.joints)])
         self._start = link.state.time
         link.exchange(())  # nothing usable: it stands
@@ -112,12 +130,8 @@ class ClientPlant(Plant):
         return self._link.exchange(command)
 
     def stop(self) -> None:
-        """Brake until it was sent rest, as long as it can be reached."""
-        with contextlib.suppress(HandrailError):
-            for _ in range(_MOST_BRAKING):
-                if not self._link.body.velocity.any():
-                    return
-                self._link.exchange(())
+        """Brake until it was sent rest."""
+        self._link.stop()
 
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> Mapping[str, NDArray[np.uint8]]:
         """Return what its cameras see, (height, width, 3) each."""
