@@ -1,6 +1,6 @@
 """A robot behind its LeRobot client, in a world of which nobody tells the truth; a robot and a world."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.robot.model import Pose, RobotModel, load_model
+from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
 
 _GAIN = 2.0  # of a joint towards its place [1/s]
@@ -32,21 +32,11 @@ _CALM = 5  # periods there in a row
 _STUCK = 40  # periods without coming nearer
 _PATIENCE = 20.0  # [s]
 
-Asked = Callable[[], EpisodeEvent | None]
 
-
-def _go() -> None:
-    """Say nothing: there is nobody to ask."""
-
-
-def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = (), asked: Asked = _go) -> None:
+def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) -> None:
     """Move the arm to its part of q, or as near as it may come to itself; the base stands.
 
-    Args:
-        link: to the robot.
-        q: where it shall be, (n,).
-        obstacles: around it, where it has no base.
-        asked: every period: the robot brakes while it says PAUSE, and stays where it is after QUIT.
+    Every period `link.asked` whether it may go on.
     """
     description = link.model.description
     base, channels = len(description.base.joints), Channels.of(description)
@@ -56,7 +46,7 @@ def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = (), 
     calm = stuck = 0
     nearest = np.inf
     for _ in range(round(_PATIENCE / link.period)):
-        while (event := asked()) is EpisodeEvent.PAUSE:
+        while (event := link.asked()) is EpisodeEvent.PAUSE:
             link.exchange(())
         if event is EpisodeEvent.QUIT:
             return
@@ -77,12 +67,12 @@ def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = (), 
     )
 
 
-def open_client(config: RecordConfig, asked: Asked = _go) -> tuple[HandrailEnv, Link]:
-    """Return the environment of a recording's robot, and the link to it; `asked` as in `bring_home`."""
+def open_client(config: RecordConfig) -> tuple[HandrailEnv, Link]:
+    """Return the environment of a recording's robot, and the link to it."""
     fps = config.robot_fps or config.dataset.fps
 
     def plant(model: RobotModel, scene: Scene, q: FloatArray, period: float, **looks: Any) -> ClientPlant:
-        return ClientPlant(model, scene, q, link, env.np_random_seed, asked)
+        return ClientPlant(model, scene, q, link, env.np_random_seed)
 
     link = connect(config.robot_client, config.client, config.camera_names, load_model(config.robot), fps)
     try:
@@ -105,17 +95,14 @@ class ClientPlant(Plant):
         q: where it begins, (n,).
         link: to it.
         seed: of the episode.
-        asked: as in `bring_home`.
     """
 
-    def __init__(
-        self, model: RobotModel, scene: Scene, q: FloatArray, link: Link, seed: int, asked: Asked = _go
-    ) -> None:
+    def __init__(self, model: RobotModel, scene: Scene, q: FloatArray, link: Link, seed: int) -> None:
         super().__init__(model, scene)
         self._link = link
         self._collision = CollisionModel(model, scene.obstacles())
         link.begin(seed)
-        bring_home(link, q, scene.obstacles(), asked)
+        bring_home(link, q, scene.obstacles())
         link.body.place(q[: len(model.description.base.joints)])
         self._start = link.state.time
         link.exchange(())  # nothing usable: it stands
@@ -147,7 +134,3 @@ class ClientPlant(Plant):
         """The pairs of shapes that overlap now, as far as is known."""
         distances = self._collision.values(self._link.state.q[None])[0]
         return tuple(" – ".join(self._collision.pairs[index]) for index in np.flatnonzero(distances < 0.0))
-
-    def poses(self) -> Mapping[str, Pose]:
-        """Return where the task has put every scene object, by name."""
-        return {item.name: Pose(item.position, item.rotation) for item in self._scene.objects}

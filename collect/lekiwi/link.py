@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.client_config import CLIENTS, ClientConfig
 from handrail.collect.flags import check_names
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
+from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
 from handrail.controllers.errors import HandrailError, imported, message_of
@@ -58,6 +59,7 @@ class Link:
         body: what is known of the robot.
         state: of the robot; its time stands still while nothing usable is heard.
         late: periods in which it was sent the full stop because the next command was late.
+        asked: says, while it goes to where an episode begins, PAUSE to brake, QUIT to stay where it is.
     """
 
     state: State
@@ -83,6 +85,7 @@ class Link:
         self.body = WholeBody(model, units, period)
         self._said: Mapping[str, Any] = {}
         self._sent_at, self.late = math.inf, 0
+        self.asked: Callable[[], EpisodeEvent | None] = lambda: None
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._episode, self._extras = 0, {}
         with _explained(f"--robot_client {name}: cannot be reached"):

@@ -107,11 +107,9 @@ class WholeBody:
             now: on any clock that advances [s].
         """
         reading = self._units.read(observation)
-        if reading is not None and self._leaps(reading, now):
-            reading = None
-        nonsense = "malformed_observation" if reading is None else ""
+        nonsense = "malformed_observation" if reading is None or self._leaps(reading, now) else ""
         self._go_on(now)
-        if reading is not None and observation is not self._said:
+        if reading and not nonsense and observation is not self._said:
             self._take(reading, now)
         self._said = observation
         if self._reading is None:
@@ -160,8 +158,7 @@ class WholeBody:
 
     def _go_on(self, now: float) -> None:
         """Take note of how far the base was sent, which it says later: `sent - said`, 0 after a rest."""
-        passed = now - self._time
-        passed = min(max(passed, 0.0), _HOLD) if math.isfinite(passed) else 0.0
+        passed = _passed(self._time, now, _HOLD)
         self._rested = 0.0 if self._twist.any() else self._rested + passed
         going = moved(self._expected(), self._twist, passed) - self._base
         most = _HOLD * self._model.description.limits.velocity[:3]
@@ -174,7 +171,8 @@ class WholeBody:
             self.targets = reading.arm.copy()
             self._grips = 1.0 - reading.openings
         elif reading.pose is None:
-            self._base = moved(self._base, 0.5 * (before.twist + reading.twist), self._since(now))
+            passed = _passed(self._heard, now, self._timeout)
+            self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)
         if reading.pose is not None:
             self._base = reading.pose
         if before is not None:
@@ -188,9 +186,10 @@ class WholeBody:
 
     def _now(self) -> FloatArray:
         """Return where the base is, (b,): since it was last heard of it goes on as it was sent."""
-        return moved(self._base, self._twist, self._since(self._time))[: self._b]
+        return moved(self._base, self._twist, _passed(self._heard, self._time, self._timeout))[: self._b]
 
-    def _since(self, now: float) -> float:
-        """Return how long ago the robot was heard of, no longer than it may be [s]."""
-        passed = now - self._heard
-        return min(max(passed, 0.0), self._timeout) if math.isfinite(passed) else 0.0
+
+def _passed(since: float, now: float, most: float) -> float:
+    """Return how long ago something was, no longer than a time; 0 of a clock that says no number [s]."""
+    passed = now - since
+    return min(max(passed, 0.0), most) if math.isfinite(passed) else 0.0
