@@ -82,11 +82,6 @@ class Cockpit:
         self._pictured = self._acted = -math.inf
         self._delay = 0.0  # of the last command, from when it was asked for [s]
 
-    @property
-    def practises(self) -> bool:
-        """Whether the episode is not to be saved."""
-        return self.person.practises
-
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Show the scene of a new episode."""
         self._env, self._snapshots = env, Snapshots(env, self._shared)

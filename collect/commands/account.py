@@ -120,15 +120,15 @@ class RecordingLog:
 
 def next_commands(root: Path) -> str:
     """Return what to try with a dataset."""
-    here = Path.cwd()
-    near = root.relative_to(here) if root.is_relative_to(here) else root
-    return _NEXT.format(root=near, bin=command_prefix())
+    return _NEXT.format(root=_from_here(root), bin=command_prefix())
 
 
 def command_prefix() -> str:
     """Return what to write before a command: nothing where the shell finds it, else the folder it is in."""
     if shutil.which("handrail-record"):
         return ""
-    folder = Path(sys.executable).parent
-    here = Path.cwd()
-    return f"{folder.relative_to(here) if folder.is_relative_to(here) else folder}/"
+    return f"{_from_here(Path(sys.executable).parent)}/"
+
+
+def _from_here(path: Path) -> Path:
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

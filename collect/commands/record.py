@@ -53,18 +53,24 @@ def _record_here(
     config: RecordConfig, share: Share | None, log: RecordingLog, console: Terminal
 ) -> tuple[Path, int, int]:
     """Record in this process; return the dataset's folder and its episodes and frames."""
-    interactive = OPERATORS.find(config.operator).interactive
+    operator = OPERATORS.find(config.operator)
+    interactive = operator.interactive
     if interactive or config.robot_client:
         come_first()
     with ExitStack() as stack:
-        env = _opened(config, interactive, stack)
-        displays = _displays(config, console, stack)
+        people: list[Any] = []
+        env = _opened(config, interactive, stack, people)
+        shown = config.display_data, config.display_web, config.display_save
+        displays = [stack.enter_context(closing(Display(*shown, console.print)))] if any(shown) else []
         build_mode(config, env.model)  # a wrong mask, or cameras without GL, show before anything is written
-        env.reset(seed=config.seed)
+        if not env.real:  # a robot moves when there is somebody to stop it
+            env.reset(seed=config.seed)
         config = located(config, env)
         if interactive and not config.resume:  # before a person's page is opened, or their device
             check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
-        people = _people(config, env, console, stack)
+        if interactive:  # whoever steers now at this computer
+            person = resolved(operator.build)(config, env, console.print)
+            people.append(stack.enter_context(closing(person)))
         beside = (lambda person: share(config, person, env)) if share else None
         recording = Recording(config, env, people, displays, beside)
         writer = stack.enter_context(session_writer(config, env))
@@ -120,27 +126,13 @@ def _print_state(writer: EpisodeWriter, console: Terminal) -> None:
         console.print(f"Adds to {writer.root}; episodes there: {writer.num_episodes}")
 
 
-def _opened(config: RecordConfig, interactive: bool, stack: ExitStack) -> HandrailEnv:
-    """Return the environment, with the link to a robot if it is no simulation."""
+def _opened(config: RecordConfig, interactive: bool, stack: ExitStack, people: list[Any]) -> HandrailEnv:
+    """Return the environment, with the link to a robot if it is no simulation; people may stop that."""
     if not config.robot_client:
         return stack.enter_context(closing(build_env(config, config.dataset.fps, render=interactive)))
     from handrail.collect.lekiwi.client_plant import open_client  # loads LeRobot
 
     env, link = open_client(config)
+    link.asked = lambda: people[0].between() if people else None
     stack.callback(link.close)
     return stack.enter_context(closing(env))
-
-
-def _displays(config: RecordConfig, console: Terminal, stack: ExitStack) -> list[Display]:
-    spawn, web, save = config.display_data, config.display_web, config.display_save
-    if not (spawn or web or save):
-        return []
-    return [stack.enter_context(closing(Display(spawn, web, save, say=console.print)))]
-
-
-def _people(config: RecordConfig, env: HandrailEnv, console: Terminal, stack: ExitStack) -> list[Any]:
-    """Return whoever steers now at this computer, if the settings say so."""
-    spec = OPERATORS.find(config.operator)
-    if not spec.interactive:
-        return []
-    return [stack.enter_context(closing(resolved(spec.build)(config, env, console.print)))]

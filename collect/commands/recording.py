@@ -94,7 +94,7 @@ class Recording:
             note: is told how it went, before an interrupt takes effect.
         """
         outcome = self._session.run(seed)
-        outcome = replace(outcome, practice=any(each.practises for each in self._people))
+        outcome = replace(outcome, practice=any(each.person.practises for each in self._people))
         with interrupts.deferred():
             for observer in self._observers:
                 observer.end(outcome)

@@ -60,6 +60,9 @@ class LocalPerson:
         main: the device that the operator is named after.
         beside: another one, such as the terminal's keys.
         follower: of a leader arm, which is then the main device; the other one has the clutch and the base.
+
+    Attributes:
+        person: who steers.
     """
 
     def __init__(
@@ -69,24 +72,15 @@ class LocalPerson:
         beside: DeviceReader | None = None,
         follower: Follower | None = None,
     ) -> None:
-        self._person, self._main, self._beside, self._follower = person, main, beside, follower
+        self.person, self._main, self._beside, self._follower = person, main, beside, follower
         self._sources = [main, beside] if beside else [main]
+        self._moving = self._sources[-1] if follower else main  # the one with the dead-man
         self._card = Card(person, main.device.name, [source.controls for source in self._sources])
         self._grips = [False] * len(person.meaning.hands)
 
     def __rich__(self) -> RenderableType:
         """Return what the terminal shows."""
         return self._card
-
-    @property
-    def person(self) -> Person:
-        """Whoever steers."""
-        return self._person
-
-    @property
-    def practises(self) -> bool:
-        """Whether the episode is not to be saved."""
-        return self._person.practises
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Show the task of a new episode."""
@@ -95,19 +89,19 @@ class LocalPerson:
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
         self._grips, self._card.brakes = [False] * len(self._grips), ""
-        self._person.reset(view, rng)
+        self.person.reset(view, rng)
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
-        said = [source.input(self._steered) for source in self._sources]
-        for action in (action for _, actions in said for action in actions):
-            self._do(action)
-        self._take(said[0][0], said[-1 if self._follower else 0][0], view)
-        answer, card = self._person.act(view), self._card
-        moving = self._sources[-1] if self._follower else self._main
-        card.view, card.moves, card.grips = view, moving.moves(self._steered), tuple(self._grips)
-        card.trouble = self._main.trouble or moving.trouble
+        self._take(*self._heard(), view)
+        answer, card = self.person.act(view), self._card
+        card.view, card.moves, card.grips = view, self._moving.moves(self._steered), tuple(self._grips)
         return answer
+
+    def between(self) -> EpisodeEvent | None:
+        """Return what holds before an episode begins: QUIT; PAUSE in the e-stop, or if a device is gone."""
+        gone = None in self._heard()
+        return self.person.between or (EpisodeEvent.PAUSE if gone else None)
 
     def see(self, frame: Frame) -> None:
         """Take note of how the controller fared."""
@@ -123,15 +117,23 @@ class LocalPerson:
         for source in self._sources:
             source.close()
 
+    def _heard(self) -> tuple[DeviceInput | None, DeviceInput | None]:
+        """Do what was pressed; return what the main device says, and the one with the dead-man."""
+        said = {source: source.input(self._steered) for source in self._sources}
+        for action in (action for _, actions in said.values() for action in actions):
+            self._do(action)
+        self._card.trouble = self._main.trouble or self._moving.trouble
+        return said[self._main][0], said[self._moving][0]
+
     @property
     def _steered(self) -> Steered:
-        meaning = self._person.meaning
-        channels, mask = meaning.channels, meaning.mask(self._person.setting)
+        meaning = self.person.meaning
+        channels, mask = meaning.channels, meaning.mask(self.person.setting)
         base = len(channels.base)
         joints = mask[channels.joint_slice]
         arm = tuple(name for name, owned in zip(channels.joints[base:], joints[base:], strict=True) if owned)
         drives = bool(mask[channels.base_slice].any() or (base and joints[:base].all()))
-        parts, pair = meaning.parts(self._person.setting), mask[channels.pair_slice]
+        parts, pair = meaning.parts(self.person.setting), mask[channels.pair_slice]
         return Steered(bool(parts), drives, arm, "two" in parts, bool(pair[6:].any()))
 
     def _take(self, main: DeviceInput | None, other: DeviceInput | None, view: View) -> None:
@@ -144,7 +146,7 @@ class LocalPerson:
         """
         if main is None or other is None or (self._follower and not main.joints):
             self._card.apart = None
-            self._person.lose()
+            self.person.lose()
             return
         on, targets = main.attended and other.attended, ()
         if self._follower:
@@ -154,25 +156,25 @@ class LocalPerson:
             self._card.apart = self._follower.apart(main.joints, view.state.q)
         else:
             on = on and HOLD in main.deflections
-        said, names = dict[str, float](), self._person.meaning.channels.names
-        parts = self._person.meaning.parts(self._person.setting)
+        said, names = dict[str, float](), self.person.meaning.channels.names
+        parts = self.person.meaning.parts(self.person.setting)
         for axis, value in other.deflections.items():
             part, _, way = axis.partition(".")
             name = f"{parts[part]}.{way}" if part in parts else axis
             said[name] = said.get(name, 0.0) + value
         axes = tuple(float(np.clip(said.get(name, 0.0), -1.0, 1.0)) for name in names)
         inputs = Input(on, self._main.device.name, tuple(self._grips), axes, 0.0, targets)
-        self._person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
+        self.person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
 
     def _do(self, action: str) -> None:
         """Do what a control asks for."""
-        hands = self._person.meaning.hands
-        grips = {"grip": hands.index(self._person.setting.hand), "grip_left": 0, "grip_right": len(hands) - 1}
+        hands = self.person.meaning.hands
+        grips = {"grip": hands.index(self.person.setting.hand), "grip_left": 0, "grip_right": len(hands) - 1}
         if action in grips:
             self._grips[grips[action]] ^= True
         elif action == "help":
             self._card.is_helping = not self._card.is_helping
         elif action == "focus" and not self._main.next_bank(self._steered):
             return  # after the last bank comes the other focus
-        elif ask := choice_of(action, self._person):
-            self._person.ask(ask)
+        elif ask := choice_of(action, self.person):
+            self.person.ask(ask)

@@ -1,6 +1,5 @@
 """A robot behind its LeRobot client, in a world of which nobody tells the truth; a robot and a world."""
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.config import RecordConfig
 from handrail.collect.lekiwi.link import Link, connect
+from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.plant import Plant
@@ -21,10 +21,8 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.robot.model import Pose, RobotModel, load_model
+from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
-
-_MOST_BRAKING = 200  # periods
 
 _GAIN = 2.0  # of a joint towards its place [1/s]
 _SPEED = 0.5  # of a joint, at most [rad/s, m/s]
@@ -36,7 +34,10 @@ _PATIENCE = 20.0  # [s]
 
 
 def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) -> None:
-    """Move the arm to its part of q, or as near as it may come to itself; the base stands."""
+    """Move the arm to its part of q, or as near as it may come to itself; the base stands.
+
+    Every period `link.asked` whether it may go on.
+    """
     description = link.model.description
     base, channels = len(description.base.joints), Channels.of(description)
     mpc = MaskedMpc(link.model)
@@ -45,6 +46,10 @@ def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) 
     calm = stuck = 0
     nearest = np.inf
     for _ in range(round(_PATIENCE / link.period)):
+        while (event := link.asked()) is EpisodeEvent.PAUSE:
+            link.exchange(())
+        if event is EpisodeEvent.QUIT:
+            return
         away = (q - link.state.q)[base:]
         farthest = np.abs(away).max()
         calm = calm + 1 if farthest < _NEAR else 0
@@ -112,12 +117,8 @@ class ClientPlant(Plant):
         return self._link.exchange(command)
 
     def stop(self) -> None:
-        """Brake until it was sent rest, as long as it can be reached."""
-        with contextlib.suppress(HandrailError):
-            for _ in range(_MOST_BRAKING):
-                if not self._link.body.velocity.any():
-                    return
-                self._link.exchange(())
+        """Brake until it was sent rest."""
+        self._link.stop()
 
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> Mapping[str, NDArray[np.uint8]]:
         """Return what its cameras see, (height, width, 3) each."""
@@ -133,7 +134,3 @@ class ClientPlant(Plant):
         """The pairs of shapes that overlap now, as far as is known."""
         distances = self._collision.values(self._link.state.q[None])[0]
         return tuple(" – ".join(self._collision.pairs[index]) for index in np.flatnonzero(distances < 0.0))
-
-    def poses(self) -> Mapping[str, Pose]:
-        """Return where the task has put every scene object, by name."""
-        return {item.name: Pose(item.position, item.rotation) for item in self._scene.objects}

@@ -15,14 +15,17 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.client_config import CLIENTS, ClientConfig
 from handrail.collect.flags import check_names
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
+from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
 from handrail.controllers.errors import HandrailError, imported, message_of
 from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import DEAD_MAN_TIME
 from handrail.controllers.robot.model import RobotModel
 
 _BACKLOG = 1000  # observations that may have waited
 _LATE = 1.5  # periods after a command, from which the next one is late
+_MOST_BRAKING = 200  # periods
 _GONE = 2.0  # without a usable observation for so long, the robot is gone [s]
 _log = logging.getLogger(__name__)
 
@@ -56,6 +59,7 @@ class Link:
         body: what is known of the robot.
         state: of the robot; its time stands still while nothing usable is heard.
         late: periods in which it was sent the full stop because the next command was late.
+        asked: says, while it goes to where an episode begins, PAUSE to brake, QUIT to stay where it is.
     """
 
     state: State
@@ -81,6 +85,7 @@ class Link:
         self.body = WholeBody(model, units, period)
         self._said: Mapping[str, Any] = {}
         self._sent_at, self.late = math.inf, 0
+        self.asked: Callable[[], EpisodeEvent | None] = lambda: None
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._episode, self._extras = 0, {}
         with _explained(f"--robot_client {name}: cannot be reached"):
@@ -103,6 +108,7 @@ class Link:
 
     def exchange(self, command: ArrayLike) -> NDArray[np.floating]:
         """Send a command, wait for the end of the period, and listen; return what was sent, (n + 1,)."""
+        late = self._clock() - self._deadline > DEAD_MAN_TIME
         with _explained(f"robot {self._name}: cannot be reached"), self._lock:
             self._send(command)
         sent = self.body.sent
@@ -110,8 +116,16 @@ class Link:
         with _explained(f"robot {self._name}: cannot be reached"), self._lock:
             self._client.send_action(self._action)
         self._wait(0.5)
-        self._listen()
+        self._catch_up() if late else self._listen()
         return sent
+
+    def stop(self) -> None:
+        """Brake until it was sent rest, whether or not it is heard."""
+        for _ in range(_MOST_BRAKING):
+            if not self.body.velocity.any():
+                return
+            with contextlib.suppress(HandrailError):
+                self.exchange(())
 
     def brake_if_late(self) -> None:
         """Send the robot a period of the full stop, if the command after the last one is late."""
@@ -134,7 +148,8 @@ class Link:
         return seen
 
     def close(self) -> None:
-        """Let it go; its own watchdog stops what still moves."""
+        """Brake, and let it go; its own watchdog stops what still moves."""
+        self.stop()
         self._closed.set()
         with self._lock:
             self._client.disconnect()
@@ -175,9 +190,9 @@ class Link:
             said = self._client.get_observation()
         now = self._clock()
         with self._lock:
-            state, self._said = self.body.observe(said, now), said
+            state = self.body.observe(said, now)
         if not self.body.trouble:
-            self.state, self._heard = state, now
+            self.state, self._said, self._heard = state, said, now
             return
         self.state = replace(state, time=self.state.time)  # it knows what was sent; its clock stands
         if now - self._heard > _GONE:
@@ -208,7 +223,16 @@ def connect(
         port_zmq_observations=config.port_zmq_observations,
         cameras={name: camera for name, camera in lekiwi_cameras_config().items() if name in cameras},
     )
-    client: Any = LeKiwiClient(settings)
+
+    class WholeClient(LeKiwiClient):
+        """Says NaN of what a message lacks, where LeRobot's says 0.0."""
+
+        def _parse_observation(self, frames: list[bytes]) -> dict[str, Any] | None:
+            unsaid = dict.fromkeys(self._state_order, math.nan)
+            with contextlib.suppress(AttributeError, TypeError):  # of JSON that is no table
+                return unsaid | super()._parse_observation(frames)  # pyright: ignore[reportOperatorIssue]
+
+    client: Any = WholeClient(settings)
     try:
         return Link(client, robot, model, 1.0 / fps, config.simulated)
     except BaseException:

@@ -183,27 +183,28 @@ class HandrailSim(Uncalibrated, Robot):
 
         A button beside the channels begins another episode (`handrail.next`), the same one again
         (`handrail.again`), or brakes and lets time stand still (`handrail.hold`); so does the same action
-        once more. Positions of all joints (`x.pos`, …) without any channel lead the joints there.
+        once more. Positions of all joints (`x.pos`, …) without any channel lead the joints there, unless
+        somebody who looks on presses a button.
         """
         self._check_connected()
         if self._config.realtime:
             self._pace.wait()
-        if not self.action.is_in(action) and all(name in action for name in self._joints):
-            self._lead(self._positions(action))
-            return action
-        numbers = self.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
+        leads = not self.action.is_in(action) and all(name in action for name in self._joints)
+        numbers = np.empty(0) if leads else self.action.numbers(action).astype(np.float32)  # as a dataset's
         repeated = self._given is not None and action is self._given[0] and action == self._given[1]
-        if pressed(action) != HOLD:  # whoever holds between two of the same, wants nothing new
+        if not leads and pressed(action) != HOLD:  # whoever holds between two of the same, wants nothing new
             self._given = action, dict(action)
         button = self.watch(repeated) or (HOLD if repeated else pressed(action))
         if button in (NEXT, AGAIN):
             self._begin(self.scene + (button == NEXT))
         elif button == HOLD:
             self._hold()
+        elif leads:
+            self._lead(self._positions(action))
         else:
             self._move(self.action.intent(numbers, self.view.state.time))
             self._driven = True
-        return dict(zip(self.action.names, map(float, numbers), strict=True))
+        return action if leads else dict(zip(self.action.names, map(float, numbers), strict=True))
 
     def disconnect(self) -> None:
         """Stop the robot and close its world."""

@@ -35,8 +35,7 @@ from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.objectives.regularisation import narrow_joint_centring
-from handrail.controllers.objectives.together import together
+from handrail.controllers.objectives.together import usual_objectives
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
@@ -46,7 +45,6 @@ from handrail.controllers.typed import Number, Positive, Text, check, check_name
 from handrail.datasets.storage.strict_json import load_json
 
 NAME = "handrail_masked_mpc"
-_CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
 _log = logging.getLogger(__name__)
 
 
@@ -127,9 +125,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         usual = asdict(MpcSettings.of(model.description.world.scale))
         settings = decoded(usual | self.settings, MpcSettings, f"{NAME} settings")
         settings.check_period(1.0 / self.fps, f"fps of {NAME}")
-        centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
-        pair = (together(channels),) if channels.pair else ()
-        self._mpc = MaskedMpc(model, settings, (*centring, *pair))
+        self._mpc = MaskedMpc(model, settings, usual_objectives(channels, model.description.limits))
         self.reset()
 
     def reset(self) -> None:

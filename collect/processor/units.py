@@ -222,21 +222,16 @@ def _plain(description: RobotDescription) -> UnitsTable:
     return UnitsTable(joints, base, own.pop("", None), own)
 
 
-def _in_degrees(prefix: str, base: BaseUnits | None = None) -> Callable[[RobotDescription], UnitsTable]:
-    """Return the units of one SO-100 or SO-101."""
+def _in_degrees(prefix: str, base: BaseUnits | None) -> Callable[[RobotDescription], UnitsTable]:
+    """Return the units of SO-100s or SO-101s: of one, or of one a hand."""
 
     def table(description: RobotDescription) -> UnitsTable:
         joints = {name: JointUnits(prefix + name) for name in description.arm_joints}
-        return UnitsTable(joints, base, GripperUnits(f"{prefix}gripper.pos", _OPEN, 0.0))
+        firsts = {hand.name: f"{hand.name}_" if hand.name else prefix for hand in description.hands}
+        own = {hand: GripperUnits(f"{first}gripper.pos", _OPEN, 0.0) for hand, first in firsts.items()}
+        return UnitsTable(joints, base if description.base.joints else None, own.pop("", None), own)
 
     return table
-
-
-def _bi_so_follower(description: RobotDescription) -> UnitsTable:
-    joints = {name: JointUnits(name) for name in description.arm_joints}
-    grippers = (hand.name for hand in description.hands)
-    own = {name: GripperUnits(f"{name}_gripper.pos", _OPEN, 0.0) for name in grippers}
-    return UnitsTable(joints, BaseUnits() if description.base.joints else None, None, own)
 
 
 def _bi_openarm_follower(description: RobotDescription) -> UnitsTable:
@@ -259,9 +254,9 @@ def _reachy2(description: RobotDescription) -> UnitsTable:
 
 _KNOWN: Mapping[str, Callable[[RobotDescription], UnitsTable]] = {
     "bi_openarm_follower": _bi_openarm_follower,
-    "bi_so_follower": _bi_so_follower,
+    "bi_so_follower": _in_degrees("", BaseUnits()),
     "lekiwi": _in_degrees("arm_", BaseUnits()),
     "plain": _plain,
     "reachy2": _reachy2,
-    "so_follower": _in_degrees(""),
+    "so_follower": _in_degrees("", None),
 }

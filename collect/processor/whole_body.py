@@ -39,9 +39,11 @@ class WholeBody:
     A joint that takes positions is sent the path of its velocity, `r⁺ = r + ½ h (v + v⁺)`: on from the target
     before, not from where it is, so that a joint that sags under its weight sags no further. It goes no
     farther ahead of the joint than 0.2 rad; where it would, the whole arm slows down and stays on its path.
+    Whatever is measured, a target moves no faster than its joint may: `|r⁺ − r| ≤ h v_max`.
 
     A robot without odometry is where its base's velocities have led. An observation that makes no sense, or
-    the very same object again, is none: the base goes on as it was sent, until the next one.
+    the very same object again, is none: the base goes on as it was sent, until the next one. So is one in
+    which a joint is where it cannot have come: `|q⁺ − q| > v_max Δt + 0.2`.
 
     Args:
         model: of the robot.
@@ -60,6 +62,7 @@ class WholeBody:
     ) -> None:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
         self._b = len(model.description.base.joints)
+        self._fastest = model.description.limits.velocity[self._b :]
         grippers = [hand.gripper for hand in model.description.hands]
         strokes = [each.speed / each.stroke if each else _STROKES for each in grippers]
         self._grip_steps = period * np.array(strokes)
@@ -104,9 +107,9 @@ class WholeBody:
             now: on any clock that advances [s].
         """
         reading = self._units.read(observation)
-        nonsense = "malformed_observation" if reading is None else ""
+        nonsense = "malformed_observation" if reading is None or self._leaps(reading, now) else ""
         self._go_on(now)
-        if reading is not None and observation is not self._said:
+        if reading and not nonsense and observation is not self._said:
             self._take(reading, now)
         self._said = observation
         if self._reading is None:
@@ -131,25 +134,31 @@ class WholeBody:
         """
         assert self._reading is not None
         b, base = self._b, self._expected()
-        if self._time - self._sent_at > self._timeout:  # meanwhile joints stand at their targets
+        passed, self._sent_at = self._time - self._sent_at, self._time
+        if passed > self._timeout:  # meanwhile joints stand at their targets
             self._gate.velocity[b:][self._units.sends_position] = 0.0
-        self._sent_at = self._time
         before = self._gate.velocity
         self.sent = self._gate.limit(command, np.append(base[:b], self.targets))
         way = 0.5 * self._period * (before + self._gate.velocity)[b:]
         arm = self._reading.arm
         most = np.where(way > 0.0, arm + _LEAD - self.targets, self.targets - arm + _LEAD)
         share = np.min(most / np.maximum(np.abs(way), 1e-12), initial=1.0)  # all slow down: the path stays
-        self.targets = np.clip(self.targets + max(share, 0.0) * way, arm - _LEAD, arm + _LEAD)
+        step = np.clip(self.targets + max(share, 0.0) * way, arm - _LEAD, arm + _LEAD) - self.targets
+        farthest = self._fastest * max(self._period, passed)  # which may be NaN
+        self.targets = self.targets + np.clip(step, -farthest, farthest)
         self._held[b:] = share < 1.0
         self._twist = turned(self._gate.velocity[:3], -base[2]) if b else np.zeros(3)
         self._grips += np.clip(self._gate.grippers - self._grips, -self._grip_steps, self._grip_steps)
         return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grips)
 
+    def _leaps(self, reading: BodyReading, now: float) -> bool:
+        """Return whether a joint is where it cannot have come since the last observation that made sense."""
+        way = self._fastest * max(now - self._heard, 0.0) + _LEAD
+        return self._reading is not None and bool((np.abs(reading.arm - self._reading.arm) > way).any())
+
     def _go_on(self, now: float) -> None:
         """Take note of how far the base was sent, which it says later: `sent - said`, 0 after a rest."""
-        passed = now - self._time
-        passed = min(max(passed, 0.0), _HOLD) if math.isfinite(passed) else 0.0
+        passed = _passed(self._time, now, _HOLD)
         self._rested = 0.0 if self._twist.any() else self._rested + passed
         going = moved(self._expected(), self._twist, passed) - self._base
         most = _HOLD * self._model.description.limits.velocity[:3]
@@ -162,7 +171,8 @@ class WholeBody:
             self.targets = reading.arm.copy()
             self._grips = 1.0 - reading.openings
         elif reading.pose is None:
-            self._base = moved(self._base, 0.5 * (before.twist + reading.twist), self._since(now))
+            passed = _passed(self._heard, now, self._timeout)
+            self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)
         if reading.pose is not None:
             self._base = reading.pose
         if before is not None:
@@ -176,9 +186,10 @@ class WholeBody:
 
     def _now(self) -> FloatArray:
         """Return where the base is, (b,): since it was last heard of it goes on as it was sent."""
-        return moved(self._base, self._twist, self._since(self._time))[: self._b]
+        return moved(self._base, self._twist, _passed(self._heard, self._time, self._timeout))[: self._b]
 
-    def _since(self, now: float) -> float:
-        """Return how long ago the robot was heard of, no longer than it may be [s]."""
-        passed = now - self._heard
-        return min(max(passed, 0.0), self._timeout) if math.isfinite(passed) else 0.0
+
+def _passed(since: float, now: float, most: float) -> float:
+    """Return how long ago something was, no longer than a time; 0 of a clock that says no number [s]."""
+    passed = now - since
+    return min(max(passed, 0.0), most) if math.isfinite(passed) else 0.0

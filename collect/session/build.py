@@ -24,14 +24,11 @@ from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.objectives.regularisation import narrow_joint_centring
-from handrail.controllers.objectives.together import together
+from handrail.controllers.objectives.together import usual_objectives
 from handrail.controllers.registry import fitting, resolved
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import frame_features
-
-_CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
 
 
 def build_env(
@@ -129,9 +126,7 @@ def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str 
     channels = Channels.of(model.description)
     make = TASKS.find(task).objectives if task and mode.task_objectives else None
     of_task = resolved(make)(channels, model.number) if make else ()
-    centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
-    pair = (together(channels),) if channels.pair else ()
-    return build(model, 1.0 / fps, (*of_task, *centring, *pair))
+    return build(model, 1.0 / fps, (*of_task, *usual_objectives(channels, model.description.limits)))
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:

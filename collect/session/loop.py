@@ -185,6 +185,11 @@ class EpisodeLoop:
             commanded=commanded,
         )
 
+    def rest(self) -> None:
+        """Stand still for a period that does not count; a simulation's time stands, a real robot is heard."""
+        if self.env.real:
+            self.now.observation, self.now.info = self.env.rest()
+
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""
         return self.env.checkpoint(), replace(self.now, tally=copy(self.tally))

@@ -171,6 +171,7 @@ class Session:
             if event is EpisodeEvent.UNDO and undo:
                 sampling = undo.back(sampling)
             elif event is EpisodeEvent.PAUSE and loop.rests:
+                loop.rest()
                 if undo:
                     undo.mark(sampling)
             elif frame := sampling.add(loop.step(asked, event), loop.time):

@@ -195,6 +195,11 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         observation, info = self._shown(state, sent, verdict)
         return observation, float(verdict.success), verdict.over and not truncated, truncated, info
 
+    def rest(self) -> tuple[Observation, dict[str, Any]]:
+        """Let the robot stand for a period that is none of the episode's."""
+        sent = self.plant.send(())
+        return self._shown(self.task_state(), sent)
+
     def _shown(
         self, state: TaskState, sent: NDArray[np.floating[Any]], verdict: Verdict | None = None
     ) -> tuple[Observation, dict[str, Any]]:

@@ -80,8 +80,8 @@ class Person:
         """Begin an episode: the robot waits for the operator."""
         self.setting = replace(self.setting, axis=-1, switches=0)
         self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.READY
-        self._event, self._armed = EpisodeEvent.QUIT if self._quits else None, False
-        self._quits = False
+        quits = self.between is EpisodeEvent.QUIT
+        self._event, self._armed, self._quits = EpisodeEvent.QUIT if quits else None, False, False
 
     def take(self, inputs: Input, received: float, round_trip: float = 0.0) -> None:
         """Take where the inputs are now.
@@ -150,6 +150,13 @@ class Person:
         if self.setting.is_single:
             self._pick_axis(inputs)
         return self.meaning.intent(inputs, self.setting, view.state, self.age, self.round_trip)
+
+    @property
+    def between(self) -> EpisodeEvent | None:
+        """What holds before an episode begins: QUIT, PAUSE in the e-stop, or None."""
+        if self._quits or self._event is EpisodeEvent.QUIT:
+            return EpisodeEvent.QUIT
+        return EpisodeEvent.PAUSE if self.phase is Phase.STOPPED else None
 
     @property
     def age(self) -> float:

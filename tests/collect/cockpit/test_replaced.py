@@ -3,6 +3,7 @@
 import asyncio
 import time
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 from cockpit_helpers import ask_for, drive
@@ -77,7 +78,7 @@ async def rest():
         await asyncio.sleep(0)
 
 
-def in_house(law):
+def in_house(law) -> Any:
     """Run a law in a loop of its own: a browser that is open has one in this thread."""
 
     def run():

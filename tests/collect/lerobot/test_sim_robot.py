@@ -77,6 +77,24 @@ def test_lerobot_leads_the_robot_back_and_the_next_scene_begins(mode, tmp_path, 
         assert robot.get_observation()["scene"] == 1
 
 
+def test_leading_the_joints_back_stops_as_long_as_somebody_says_so(tmp_path):
+    with steered(tmp_path, mode="direct") as (robot, teleop):
+        first = {name: value for name, value in robot.get_observation().items() if name.endswith(".pos")}
+        loop(robot, teleop, 30)
+        robot.watch = lambda repeated: HOLD
+        for _ in range(40):
+            robot.send_action(dict(first))
+        assert robot.loop.rests
+        held = robot.view.state.q
+        robot.send_action(dict(first))
+        assert np.array_equal(robot.view.state.q, held)
+        robot.watch = lambda repeated: ""
+        for _ in range(200):
+            robot.send_action(dict(first))
+        back = [first[f"{name}.pos"] for name in robot.env.model.joints]
+        np.testing.assert_allclose(robot.view.state.q, back, atol=0.02)
+
+
 def test_scenes_of_an_evaluation_are_those_of_handrail_evaluate(tmp_path):
     with steered(tmp_path, evaluation=True, seed=2, episode=7) as (robot, _):
         expected, _ = build_env(SessionConfig(task="reach"), 20).reset(seed=evaluation_seed(2, 7))

@@ -261,7 +261,7 @@ def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(ga
         (row,) = (row for row in table.rows if row[:2] == (condition.label, condition.treatment))
         assert row[4] == wording.points(np.mean(apart))
         by_scipy: Any = stats.ttest_1samp(apart, 0.0)
-        low, high = (float(each) for each in row[5].replace("−", "-").replace("+", "").split(" to "))
+        low, high = (float(each) for each in str(row[5]).replace("−", "-").replace("+", "").split(" to "))
         assert high - low >= 100 * np.diff(by_scipy.confidence_interval())[0] - 1.0
 
 
