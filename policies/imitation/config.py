@@ -56,15 +56,11 @@ class TrainConfig:
     init: str = ""
     """Begin with the weights of an earlier policy, from its folder; it has to read and write the same."""
     steps: Count = 0
-    """Updates of the policy; 0 for the preset's. With --patience the most that there may be."""
+    """Updates of the policy; 0 for the preset's."""
     eval_split: Advanced[Annotated[float, Meta(ge=0, lt=1)]] = 0.0
     """Share of the episodes that the policy does not learn from, 5 at least: the loss is measured on them."""
     eval_steps: Advanced[AtLeastOne] = 500
     """Updates between two such measurements."""
-    patience: Advanced[Count] = 0
-    """End when that loss is flat: so many measurements brought too little; 0 makes all updates."""
-    improvement: Advanced[Annotated[float, Meta(ge=0, lt=1)]] = 0.02
-    """Share by which the best of these measurements has to be below the best before them."""
     batch_size: Advanced[Count] = 0
     """Samples an update; 0 for the preset's."""
     lr: Advanced[NonNegative] = 0.0
@@ -94,8 +90,6 @@ class TrainConfig:
     def check(self) -> None:
         """Check what can be checked without reading the dataset."""
         check_settings(self, "--")
-        if self.patience and not self.eval_split:
-            raise HandrailError("--patience: expected --eval_split too, the share of episodes to measure on")
         if not self.scene and not self.images:
             raise HandrailError("--no_scene: expected --images too, else the policy sees nothing of its task")
         if self.encoder and (self.images or not self.scene or self.actions == "recorded"):

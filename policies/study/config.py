@@ -13,8 +13,8 @@ class StudyConfig(ExecutionConfig):
     """Collect, train, evaluate and compare: teleop modes × tasks × draws, from one design."""
 
     preset: str = "quick"
-    """Which study: quick, factors, pictures, protected, takeover, answer, amount, parts, errors, or a file of
-    your own that ends in .toml (see policies/study/presets)."""
+    """Which study: quick, answer, amount, parts, errors, pictures, takeover, or a file of your own that
+    ends in .toml (see policies/study/presets)."""
     output: str = "outputs/study"
     """Folder of datasets, policies, evaluations and report; what is done there is not done again."""
     page: str = ""

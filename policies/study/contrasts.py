@@ -9,8 +9,8 @@ import numpy as np
 
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.replicates import student
-from handrail.policies.study.declared import Parts, declared, of_factors, of_pair, of_ways
-from handrail.policies.study.design import CONTRASTS, StudyDesign
+from handrail.policies.study.declared import Parts, declared, of_pair, of_ways
+from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
 DECLARED, EXPLORATORY, SYSTEM = "declared", "exploratory", "system"
@@ -38,7 +38,7 @@ def contrasts(results: Results) -> list[Contrast]:
 
 def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
     """Yield all that may be of interest, what is declared among it."""
-    ask, factors = partial(_contrast, results, EXPLORATORY, tasks), design.factors
+    ask = partial(_contrast, results, EXPLORATORY, tasks)
     if rounds := design.rounds:
         for number, pair in product(range(1, rounds.count + 1), rounds.pairs):
             yield ask(*of_ways(pair, number))
@@ -47,26 +47,13 @@ def _exploratory(results: Results, design: StudyDesign, tasks: tuple[str, ...]) 
         for number, way in product(range(1, rounds.count + 1), rounds.ways):
             yield ask(*of_pair(f"{way}-{number} intent", f"{design.baseline} intent"))
         return
-    if not factors:
-        rivals = [mode for mode in design.modes if mode != design.baseline]
-        for mode, ending in product(rivals, ("", " same number")):
-            yield ask(*of_pair(mode, design.baseline, ending))
-        for each in declared(design):
-            yield ask(each.label, each.parts)
-            yield ask(each.label, each.parts, "clean")
-        yield from _systems(results, design, tasks)
-        return
-    for name in CONTRASTS:
-        yield ask(*of_factors(factors, name))
-    for pair in factors.pairs:
-        yield ask(*of_pair(*pair))
-        yield ask(*of_pair(*pair), "clean")
-        yield ask(*of_pair(*pair, " same number"))
+    rivals = [mode for mode in design.modes if mode != design.baseline]
+    for mode, ending in product(rivals, ("", " same number")):
+        yield ask(*of_pair(mode, design.baseline, ending))
+    for each in declared(design):
+        yield ask(each.label, each.parts)
+        yield ask(each.label, each.parts, "clean")
     yield from _systems(results, design, tasks)
-    for name in CONTRASTS:
-        yield ask(*of_factors(factors, name, " same number"))
-        yield ask(*of_factors(factors, name), "contact")
-        yield ask(*of_factors(factors, name), "clean")
 
 
 def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:

@@ -15,33 +15,19 @@ curve = [5000, 10000]           optional: what policies have learnt after fewer 
 [tasks.reach]
 minutes = 10.0                  of the operator's time in each mode, failed attempts included
 episodes = 50                   successful demonstrations in each mode, at least
-steps = 4000                    updates of each policy; the most there may be where there is a [flat]
+steps = 4000                    updates of each policy
 batch_size = 0                  samples an update; 0 for the preset's
 rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
 time_limit = 60.0               of a demonstration [s]; the task's own without it
 sizes = [3.0, 5.0]              optional, exploratory: more policies, of only so many of the minutes
 round_minutes = 0.0             with [rounds]: of the operator's time in each way in each round
 
-[flat]                          optional: train until the loss on held-out episodes is flat, one rule for all
-held_out = 0.1                  share of the episodes, 5 at least
-every = 500                     updates between two measurements of that loss
-patience = 4                    measurements, the best of which has to be
-improvement = 0.02              by this share below the best before them
-
-[factors]                       optional: the 2 × 2 of what is steered and whether the MPC completes it
-hand_mpc = "ee"                 the mode that is each cell
-hand_none = "ee_dls"
-joint_mpc = "joints"
-joint_none = "direct"
-primary = ["input", "controller", "interaction"]        declared before the run, tested; [] for none
-sd = 0.1                        of a policy's success from draw to draw, for the power
-
 [[pairs]]                       optional: success of one mode − another, declared before the run, tested
 one = "ee"
 other = "direct"
 budget = "number"               of policies of the same number of demonstrations, as in [beside]; else "time"
 margin = 0.1                    optional: whether they are equivalent, nearer than this, is tested too
-sd = 0.1                        as in [factors]
+sd = 0.1                        of a policy's success from draw to draw, for the power
 
 [beside]                        optional, exploratory: more policies
 intents = ["ee"]                of these modes also the operator's intent is learnt, completed when it drives
@@ -81,7 +67,6 @@ from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.typed import AtLeastOne, Count
 
-CONTRASTS = ("input", "controller", "interaction")
 MOST_DRAWS = 1000
 MIXED = "_and_"  # between the modes of a recording that has several
 _Few = Annotated[int, Meta(ge=1, le=MOST_DRAWS)]
@@ -100,39 +85,6 @@ class TaskDesign:
     time_limit: float = 0.0
     sizes: tuple[float, ...] = ()
     round_minutes: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
-
-
-@dataclass(frozen=True)
-class Flat:
-    """When a policy has learnt what there is; explained above."""
-
-    held_out: float = 0.1
-    every: int = 500
-    patience: int = 4
-    improvement: float = 0.02
-
-
-@dataclass(frozen=True)
-class Factors:
-    """Which mode is which cell of the 2 × 2, and what is tested; explained above."""
-
-    hand_mpc: str
-    hand_none: str
-    joint_mpc: str
-    joint_none: str
-    primary: tuple[str, ...] = CONTRASTS
-    sd: float = 0.1
-
-    @property
-    def modes(self) -> tuple[str, str, str, str]:
-        """The four cells."""
-        return self.hand_mpc, self.hand_none, self.joint_mpc, self.joint_none
-
-    @property
-    def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Cells that are compared by themselves: that differ in one thing, and the two of a user's choice."""
-        hand, joint = (self.hand_mpc, self.hand_none), (self.joint_mpc, self.joint_none)
-        return hand, joint, *zip(hand, joint, strict=True), (self.hand_mpc, self.joint_none)
 
 
 @dataclass(frozen=True)
@@ -205,9 +157,7 @@ class StudyDesign:
     persons: _Few = 5
     seed: Annotated[int, Meta(ge=0, le=10**5)] = 0
     curve: tuple[AtLeastOne, ...] = ()
-    flat: Flat | None = None
     pairs: tuple[DeclaredPair, ...] = ()
-    factors: Factors | None = None
     beside: Beside | None = None
     rounds: Rounds | None = None
     encoders: Mapping[str, str] = field(default_factory=dict)
@@ -232,10 +182,6 @@ class StudyDesign:
             self._check_rounds(self.rounds)
         once: dict[str, tuple[str, ...]] = {"modes": self.modes}
         draws: dict[str, int] = {}
-        if factors := self.factors:
-            check_known("mode of the factors", factors.modes, self.modes)
-            check_known("contrast", factors.primary, CONTRASTS)
-            once |= {"factors": factors.modes, "factors.primary": factors.primary or CONTRASTS}
         check_known(
             "mode of a pair", (mode for each in self.pairs for mode in (each.one, each.other)), self.modes
         )
@@ -246,8 +192,6 @@ class StudyDesign:
         numbered = counted.numbered or (self.modes if counted.same_number else ())
         by_number = (mode for *two, budget in pairs if budget == "number" for mode in two)
         check_known("mode of a pair by number, which same_number has in all draws", by_number, numbered)
-        if self.pairs and self.factors and self.factors.primary:
-            raise HandrailError(f"study {self.name}: expected pairs or factors.primary, got both")
         most = min(task.steps for task in self.tasks.values())
         if any(updates % self.curve[0] or updates >= most for updates in self.curve):
             words = f"expected multiples of the first below {most} updates"
@@ -272,7 +216,7 @@ class StudyDesign:
     def _check_rounds(self, rounds: Rounds) -> None:
         """Check that there are ways to compare, and nothing that rounds do not know of."""
         where = f"study {self.name}: rounds"
-        for other in ("curve", "flat", "pairs", "factors", "beside", "encoders", "robustness"):
+        for other in ("curve", "pairs", "beside", "encoders", "robustness"):
             if getattr(self, other):
                 raise HandrailError(f"{where}: expected no {other} beside them")
         check_known("mode of rounds", self.modes, MODES)

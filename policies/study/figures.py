@@ -1,4 +1,4 @@
-"""The figures of a study: contrasts, the policies by task, their training, what disturbs."""
+"""The figures of a study: contrasts, the policies by task, what disturbs, growth."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -19,7 +19,6 @@ CAPTIONS = {
     " diamonds: intent through the MPC, policy and controller;"
     " squares: the same number of demonstrations.",
     "rounds": "Success of the policies, which drive alone, against the operator's time so far; lines: 95 %.",
-    "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
     "robustness": "Success disturbed and undisturbed.",
     "updates": "Success after more and more updates: the mean over draws, and 95 %.",
     "amounts": "Success against the operator's minutes: the mean over draws, and 95 %.",
@@ -29,7 +28,6 @@ CAPTIONS = {
 def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     """Return matplotlib figures by name, see `CAPTIONS`; those for which there is something to show."""
     tasks = [task for task in results.progress.design.tasks if results.of_task(task)]
-    curved = [task for task in tasks if any(_curves(each, results) for each in results.of_task(task))]
     disturbed = [task for task in tasks if _disturbed(task, results)]
     made: dict[str, Any] = {}
     if any(each.interval and each.family == DECLARED for each in found):
@@ -38,8 +36,6 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
         return made | ({"rounds": _rounds(tasks, list(rounds.ways), results)} if tasks else {})
     if tasks:
         made["answer"] = _answer(tasks, results)
-    if curved:
-        made["training"] = _training(curved, results)
     if disturbed:
         made["robustness"] = _robustness(disturbed, results)
     if tasks and results.progress.design.curve:
@@ -123,29 +119,6 @@ def _rounds(tasks: Sequence[str], ways: Sequence[str], results: Results) -> Any:
         tidy(axes, "y")
     figure.axes[0].set_ylabel("policy success [%], 95 %")
     figure.axes[-1].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return figure
-
-
-def _curves(condition: StudyCondition, results: Results) -> list[tuple[list[int], list[float]]]:
-    """Return updates and loss on held-out episodes of each policy."""
-    found = [each["validation"] for each in results.trained(condition) if each.get("validation")]
-    return [(steps := sorted(map(int, each)), [each[str(step)] for step in steps]) for each in found]
-
-
-def _training(tasks: Sequence[str], results: Results) -> Any:
-    """One panel a task: the loss on held-out episodes of every policy of joint velocities; a dot ends it."""
-    figure, panels = _panels(tasks, 3.2)
-    for axes, task in panels:
-        for each in results.of_task(task):
-            style, alone = _style(each, results), each.label in results.progress.design.modes
-            for place, (steps, losses) in enumerate(_curves(each, results) if alone else ()):
-                name = style["label"] if place == 0 else None
-                axes.plot(np.divide(steps, 1000), losses, color=style["color"], lw=0.8, alpha=0.7, label=name)
-                axes.plot(steps[-1] / 1000, losses[-1], "o", color=style["color"], ms=3)
-        axes.set(xlabel="updates [thousand]", ylim=(0, None), xlim=(0, None))
-        axes.legend(fontsize=8, frameon=False)
-        tidy(axes)
-    figure.axes[0].set_ylabel("loss on held-out episodes")
     return figure
 
 

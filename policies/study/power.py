@@ -42,11 +42,11 @@ def plan(design: StudyDesign) -> str:
     asked = declared(design)
     if not asked:
         return "Nothing is declared: whatever comes out is exploratory."
-    told = f"Declared: {', '.join(each.name for each in asked)}, over {', '.join(design.tasks)} together."
+    told = f"Declared: {', '.join(each.label for each in asked)}, over {', '.join(design.tasks)} together."
     if design.draws < 2:
         return f"{told} One draw tests nothing."
     whole, single = (
-        ", ".join(f"{each.name} {100 * detectable(design, each, *scope):.0f}" for each in asked)
+        ", ".join(f"{each.label} {100 * detectable(design, each, *scope):.0f}" for each in asked)
         for scope in ((), (1, 1))
     )
     spread = " or ".join(f"{100 * sd:g}" for sd in sorted({each.sd for each in asked}))

@@ -15,11 +15,10 @@ from handrail.datasets.presentation.wording import percent
 from handrail.datasets.statistics.contrast import LEVEL, Contrast
 from handrail.datasets.statistics.replicates import equivalence_p
 from handrail.datasets.storage.atomic import explained, write_whole
-from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.study import tables
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.contrasts import DECLARED, contrasts
-from handrail.policies.study.declared import WORDS, Declared, declared
+from handrail.policies.study.declared import Declared, declared
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.figures import CAPTIONS, figures
 from handrail.policies.study.power import plan
@@ -34,9 +33,8 @@ _HOW = (
     "A draw is a fresh recording (other scenes, other scripted persons), one training seed and beginnings"
     " of its own; it is the same for all modes, so draws are pairs. Every mode got the same operator time,"
     " failed attempts included; “same number” is of demonstrations instead."
-    " With [flat] in the design each policy was trained until its loss on held-out"
-    " episodes fell no longer; without it every policy got the same updates. Policies write joint velocities,"
-    " which go to the robot unprotected; an “intent” is the operator's command, which the MPC completes when"
+    " Every policy got the same updates. Policies write joint velocities, which go to the robot"
+    " unprotected; an “intent” is the operator's command, which the MPC completes when"
     " the policy drives, too. Intervals are 95 %: Student's t over draws, where a draw varies at least as its"
     " rollouts do; with one draw Wilson's, of these very policies. Contrasts are taken within each draw;"
     " several tasks count alike. Only declared contrasts are tested, p after Holm over these; all others"
@@ -146,7 +144,7 @@ def _write_page(
 
 
 def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
-    """Return the headline, a sentence each: the interaction first, as means over what differs mislead."""
+    """Return the headline: a sentence for each declared contrast, then of equivalence."""
     asked, tested = declared(design), {each.label: each for each in found if each.family == DECLARED}
     if not asked:
         return ["No contrast was declared before the run: what is shown explores, and nothing is tested."]
@@ -154,10 +152,7 @@ def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
         return ["No draw has all that is declared on all tasks yet: nothing can be said."]
     if design.rounds:
         return [sentence(each, name, _sides(each)) for name, each in tested.items()]
-    names = [name for name in dict.fromkeys([*reversed(WORDS.values()), *tested]) if name in tested]
-    capitals = {name: f"{name[:1].upper()}{name[1:]}" for name in WORDS.values()}  # no names of modes
-    told = [sentence(tested[name], capitals.get(name, name)) for name in names]
-    return told + [
+    return [sentence(each, name) for name, each in tested.items()] + [
         _equivalent(tested[each.label], each) for each in asked if each.margin and each.label in tested
     ]
 
@@ -184,12 +179,6 @@ def cautions(results: Results) -> dict[str, object]:
         for job in progress.jobs
         if "digest_before" in progress.note(job).get("result", {}) and not job.policy
     ]
-    capped = sum(
-        _capped(each, design, condition.task)
-        for condition in results.conditions.values()
-        if not condition.treatment
-        for each in results.trained(condition)
-    )
     missing, jobs = len(progress.missing), len(progress.jobs)
     return {
         _LIMITS: True,
@@ -198,14 +187,4 @@ def cautions(results: Results) -> dict[str, object]:
         "The design was changed after the study began. Digests, in order:"
         f" {', '.join(seen)}; this report is of {design.digest}.": {*seen} - {design.digest},
         f"Recorded again, and the rows were others than before: {', '.join(again)}.": again,
-        f"Policies that ended with the most updates, before their loss was flat: {capped}.": capped,
     }
-
-
-def _capped(result: Mapping[str, Any], design: StudyDesign, task: str) -> bool:
-    """Return whether a training ended before its loss was flat."""
-    flat = design.flat
-    if flat is None:
-        return False
-    losses = {int(step): loss for step, loss in result.get("validation", {}).items()}
-    return Plateau(losses, flat.patience, flat.improvement, design.tasks[task].steps, 0).flat is None

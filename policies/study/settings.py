@@ -25,8 +25,9 @@ _DATASET, _POLICY = Path("dataset"), Path("policy")  # of settings that are only
 _RECORDED = ("task", "mode", "noise", "time_limit", "seed")
 _LEARNT = (
     *("policy", "actions", "success_only", "episodes", "minutes", "draw", "seed"),
-    *("eval_split", "eval_steps", "patience", "improvement"),
+    *("eval_split", "eval_steps"),
 )
+_GONE = {"patience": 0, "improvement": 0.02}  # of a training no more; what was done with these stays done
 _DRIVEN = ("episodes", "seed", "label", "protection", "perturbation", "time_limit")
 
 
@@ -110,11 +111,8 @@ def recording(
 
 def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
     """Return how a policy is trained."""
-    task, timed, flat = design.tasks[policy.cell.task], policy.budget == "time", design.flat
+    task, timed = design.tasks[policy.cell.task], policy.budget == "time"
     ended: dict[str, Any] = {"save_freq": design.curve[0]} if design.curve else {}
-    if flat:
-        ended |= {"eval_split": flat.held_out, "eval_steps": flat.every}
-        ended |= {"patience": flat.patience, "improvement": flat.improvement}
     return TrainConfig(
         dataset=StoredConfig(root=str(dataset)),
         output=str(output),
@@ -186,7 +184,7 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     if job.policy is None:
         return found
     learnt = training(job.policy, design, _DATASET, _POLICY)
-    trained = _some(learnt, (*_LEARNT, "corrections") if job.before else _LEARNT)
+    trained = _GONE | _some(learnt, (*_LEARNT, "corrections") if job.before else _LEARNT)
     if design.curve and job.policy == StudyPolicy(cell):  # of what is done the checkpoints are gone
         trained |= {"curve": list(design.curve)}
     if learnt.encoder:

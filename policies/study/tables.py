@@ -60,8 +60,9 @@ def conditions_table(task: str, results: Results) -> Table:
 
 def _condition(each: StudyCondition, results: Results) -> tuple[str, ...]:
     learnt = results.trained(each)
-    names = ("episodes", "held_out", "operator_time")
-    episodes, held, seconds = (np.mean([e["trained_on"].get(name, 0.0) for e in learnt]) for name in names)
+    episodes, seconds = (
+        np.mean([e["trained_on"].get(name, 0.0) for e in learnt]) for name in ("episodes", "operator_time")
+    )
     steps, touched = sorted(one["steps"] for one in learnt), each.rolled("contact")
     return (
         each.label,
@@ -71,7 +72,7 @@ def _condition(each: StudyCondition, results: Results) -> tuple[str, ...]:
         f"{touched.sum():.0f} of {len(touched)}",
         percent(float(each.rolled("clean").mean())),
         number(each.mean("length")),
-        f"{episodes:.0f} episodes + {held:.0f} held out, {seconds / 60.0:.1f} min",
+        f"{episodes:.0f} episodes, {seconds / 60.0:.1f} min",
         " to ".join(map(str, sorted({steps[0], steps[-1]}))),
     )
 

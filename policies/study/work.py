@@ -210,7 +210,6 @@ def _train_and_evaluate(
         "steps": meta.steps,
         "trained_on": dict(meta.trained_on),
         "data": meta.data,
-        "validation": dict(meta.validation),
         "training_seconds": round(trained - start, 1),
         "rollout_seconds": round(time.monotonic() - trained, 1),
     }

@@ -1,10 +1,11 @@
-"""A study of made-up rollouts: a 2 × 2, two tasks, four draws, and everything beside."""
+"""A study of made-up rollouts: four modes, two tasks, four draws, two declared pairs, and more beside."""
 
-from handrail.policies.study.design import Beside, Factors, Flat, StudyDesign, TaskDesign
+from handrail.policies.study.design import Beside, DeclaredPair, StudyDesign, TaskDesign
 
 TASK = TaskDesign(minutes=1.0, episodes=5, steps=10)
 MODES = ("ee", "decoupled", "joints", "direct")
-FACTORS = Factors(*MODES)
+PAIRS = (DeclaredPair("ee", "decoupled", margin=0.1, sd=0.05), DeclaredPair("ee", "direct", "number"))
+LABELS = ["ee − decoupled", "ee − direct (same number)"]
 DESIGN = StudyDesign(
     "made",
     MODES,
@@ -12,9 +13,8 @@ DESIGN = StudyDesign(
     "direct",
     draws=4,
     rollouts=20,
-    factors=FACTORS,
+    pairs=PAIRS,
     beside=Beside(("ee",), 4, 4),
-    flat=Flat(every=5, patience=1),
 )
 SHARES = {
     "ee": (0.95, 0.9, 1.0, 0.9),

@@ -45,7 +45,6 @@ LEARNT = {
     "steps": 10,
     "trained_on": {"episodes": 5.0, "operator_time": 90.0},
     "data": "da7a",
-    "validation": {"5": 0.4, "10": 0.3},
     "training_seconds": 8.0,
     "rollout_seconds": 2.0,
 }

@@ -26,7 +26,6 @@ from lerobot.scripts.lerobot_train import update_policy
 from lerobot.utils.logging_utils import AverageMeter, MetricsTracker
 from lerobot.utils.random_utils import set_seed
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from torch.optim.lr_scheduler import LambdaLR
 from torch.utils.data import BatchSampler
 
 from handrail.controllers.errors import HandrailError
@@ -39,7 +38,6 @@ from handrail.policies.imitation.interface.steps import Completion, with_steps, 
 from handrail.policies.imitation.interface.trained import check_numbers, load_weights
 from handrail.policies.imitation.training.curve import Curve, read_sums, write_sums
 from handrail.policies.imitation.training.memory import MemoryDataset
-from handrail.policies.imitation.training.plateau import Plateau
 
 _WHOLE_MODEL = (DistributedType.NO, DistributedType.MULTI_CPU, DistributedType.MULTI_GPU)  # in every process
 _PRECISIONS = {"float32": "no", "bfloat16": "bf16", "float16": "fp16"}  # accelerate's names
@@ -56,8 +54,6 @@ class TrainingRun:
         settings: LeRobot's.
         learnt: what is learnt from.
         checkpoint: to go on from; None to begin.
-        plateau: ends the training where the loss on held-out episodes is flat, and says how the learning rate
-            goes; None makes all updates, by the settings' schedule.
         encoder: that reads pictures for the policy when it drives.
         earlier: the policy whose weights and normalisation one that begins has; None for weights of its own.
     """
@@ -67,15 +63,13 @@ class TrainingRun:
         settings: TrainPipelineConfig,
         learnt: MemoryDataset,
         checkpoint: Path | None,
-        plateau: Plateau | None,
         encoder: Encoder | None = None,
         earlier: Path | None = None,
     ) -> None:
         described = settings.policy
         assert described is not None
         assert settings.output_dir is not None
-        self._settings, self._learnt, self._plateau = settings, learnt, plateau
-        self._encoder = encoder
+        self._settings, self._learnt, self._encoder = settings, learnt, encoder
         self._folder, self._sums = settings.output_dir, read_sums(checkpoint)
         self._accelerator = _accelerator(described)
         set_seed(settings.seed, self._accelerator)  # pyright: ignore[reportArgumentType]
@@ -92,8 +86,6 @@ class TrainingRun:
             load_weights(policy, place)  # LeRobot leaves out what does not fit
             check_numbers(policy, around, place)
         optimizer, schedule = make_optimizer_and_scheduler(settings, policy)
-        if plateau is not None:
-            schedule = LambdaLR(optimizer, plateau.rate)
         if isinstance(optimizer, torch.optim.Adam):
             for group in optimizer.param_groups:  # all weights in one call
                 group["fused"], group["foreach"] = True, False
@@ -135,9 +127,9 @@ class TrainingRun:
             Interrupts() as interrupts,
             interrupts.deferred(),
         ):
-            bar = progress.add_task("", total=self._end, completed=self._step)
+            bar = progress.add_task("", total=settings.steps, completed=self._step)
             batches, ends = self._batches(self._step), False
-            while self._step < self._end and not ends:
+            while self._step < settings.steps and not ends:
                 self._step += 1
                 began = time.perf_counter()
                 batch = self._before(next(batches))
@@ -151,21 +143,15 @@ class TrainingRun:
                         curve.add(row := means.to_dict() | {"step": self._step})
                         progress.update(bar, description=f"loss {row['loss']:.4f}")
                     means.reset_averages()
-                if held_out and (self._step % every == 0 or self._step == self._end):
+                if held_out and (self._step % every == 0 or self._step == settings.steps):
                     losses[self._step] = self._loss_on(held_out)
-                    progress.update(bar, total=self._end)
                 ends = interrupts.asked
-                if ends or should_save_checkpoint(self._step, settings.save_freq, self._end):
+                if ends or should_save_checkpoint(self._step, settings.save_freq, settings.steps):
                     if main:
                         self._save(meta(self._step), means)
                     if not ends:  # of other processes' interrupts this one does not know
                         self._accelerator.wait_for_everyone()
         self._accelerator.end_training()
-
-    @property
-    def _end(self) -> int:
-        """The last update, as far as is known now."""
-        return self._plateau.end if self._plateau else self._settings.steps
 
     def _loss_on(self, held_out: MemoryDataset) -> float:
         """Return the loss on episodes, the same in every process; what is random goes on as before."""

@@ -31,7 +31,6 @@ from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
 from handrail.policies.imitation.training.earlier import earlier_policy
-from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.imitation.training.presets import (
     check_settings,
     in_one_line,
@@ -61,16 +60,13 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     like = earlier[1] if earlier else began if config.init else None
     source, steps = read_source(config, began, like), resolved(config).steps
     losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
-    plateau, warmup = None, min(_WARMUP, steps // 10)
-    if config.patience:
-        plateau = Plateau(losses, config.patience, config.improvement, steps, warmup)
-    if checkpoint is None or int(checkpoint.name) < (plateau.end if plateau else steps):
+    if checkpoint is None or int(checkpoint.name) < steps:
         with threads(config.threads), _quiet(config), in_one_line(config):
-            settings = _settings(config, steps, warmup)
+            settings = _settings(config, steps)
             assert settings.policy is not None
             learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
             place = earlier and earlier[0]
-            training = TrainingRun(settings, learnt, checkpoint, plateau, source.encoder, place)
+            training = TrainingRun(settings, learnt, checkpoint, source.encoder, place)
             measured = out[0] if out else None, losses, config.eval_steps
             training.train(lambda step: _meta(source, step, losses), *measured, quiet)
         checkpoint = last_checkpoint(config.folder)
@@ -88,9 +84,9 @@ def _checked(config: TrainConfig, checkpoint: Path) -> PolicyMeta:
     return began
 
 
-def _settings(config: TrainConfig, steps: int, warmup: int) -> TrainPipelineConfig:
+def _settings(config: TrainConfig, steps: int) -> TrainPipelineConfig:
     sizes, policy = resolved(config), policy_config(config)
-    schedule = Cosine(warmup) if sizes.cosine else policy.get_scheduler_preset()
+    warmed = Cosine(min(_WARMUP, steps // 10))
     return TrainPipelineConfig(
         dataset=DatasetConfig(config.dataset.name, root=str(config.dataset.folder), video_backend="pyav"),
         policy=policy,
@@ -104,7 +100,7 @@ def _settings(config: TrainConfig, steps: int, warmup: int) -> TrainPipelineConf
         save_freq=config.save_freq,
         env_eval_freq=0,
         optimizer=policy.get_optimizer_preset(),
-        scheduler=None if config.patience else schedule,  # then the plateau says it
+        scheduler=warmed if sizes.cosine else policy.get_scheduler_preset(),
     )
 
 

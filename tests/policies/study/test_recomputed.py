@@ -16,7 +16,7 @@ LINE = r"(\w+): (\S+) \((\S+) to (\S+)\), 8 draws, p (\S+), after Holm (\S+)"
 
 def test_what_was_declared_comes_out_as_published():
     archive = RESULTS / "teleop_modes_factors.tar.xz"
-    design = ROOT / "policies" / "study" / "presets" / "factors.toml"
+    design = RESULTS / "teleop_modes_factors.toml"
     done = subprocess.run(
         [sys.executable, RESULTS / "recompute.py", archive, design],
         capture_output=True,
@@ -36,7 +36,7 @@ def test_what_was_declared_comes_out_as_published():
 
 def test_an_archive_that_lacks_a_draw_is_not_tested(tmp_path):
     design = tmp_path / "more.toml"
-    factors = (ROOT / "policies" / "study" / "presets" / "factors.toml").read_text()
+    factors = (RESULTS / "teleop_modes_factors.toml").read_text()
     design.write_text(factors.replace("draws = 8", "draws = 9"))
     script = [sys.executable, RESULTS / "recompute.py", RESULTS / "teleop_modes_factors.tar.xz", design]
     done = subprocess.run(script, capture_output=True, text=True, check=False)

@@ -18,8 +18,6 @@ from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import (
     Beside,
     DeclaredPair,
-    Factors,
-    Flat,
     Robustness,
     Rounds,
     StudyDesign,
@@ -29,7 +27,6 @@ from handrail.policies.study.design import (
 from handrail.policies.study.settings import load_design
 
 SHOWN = ("\n", " = "), ("[", ""), ("[rounds.", ".")
-FACTORS = "[factors]\nhand_mpc = 'ee'\nhand_none = 'direct'\njoint_mpc = 'ee'\njoint_none = 'direct'\n"
 PAIR = "[[pairs]]\none = 'ee'\nother = 'direct'\n"
 
 
@@ -49,13 +46,8 @@ PAIR = "[[pairs]]\none = 'ee'\nother = 'direct'\n"
         (("minutes = 0.1", "minutes = 0.1\nbatch_size = -4"), "batch_size: expected a whole number >= 0"),
         (('intents = ["ee"]', 'intents = ["direct"]'), "unknown mode of intents, which the MPC completes"),
         (("[beside]", '[beside]\ntargets = ["direct"]'), "targets"),
-        (("[beside]", "[flat]\nheld_out = 1.5\n[beside]"), "--eval_split: expected a number < 1"),
-        (("[beside]", "[factors]\nhand_mpc = 'ee'\n[beside]"), "hand_none"),
-        (("[beside]", FACTORS.replace("direct", "leader") + "[beside]"), "unknown mode of the factors"),
-        (("[beside]", FACTORS + "[beside]"), "factors expected some, each once"),
-        (("[beside]", FACTORS + 'primary = ["luck"]\n[beside]'), "unknown contrast 'luck'"),
+        (("[beside]", "[factors]\nhand_mpc = 'ee'\n[beside]"), "factors"),
         (("[beside]", PAIR.replace("direct", "leader") + "[beside]"), "unknown mode of a pair 'leader'"),
-        (("[beside]", PAIR + FACTORS + "[beside]"), "expected pairs or factors.primary, got both"),
         (("[beside]", PAIR.replace("one", "own") + "[beside]"), "own"),
         (("[beside]", PAIR.replace("direct", "ee") + "[beside]"), "pairs: expected two modes each, once"),
         (("[beside]", 2 * PAIR + "[beside]"), "pairs: expected two modes each, once"),
@@ -102,7 +94,7 @@ def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(tmp_path,
 
 def test_every_setting_of_a_design_is_explained_where_people_look():
     written = design_module.__doc__ or ""
-    for kind in (StudyDesign, TaskDesign, Flat, Factors, DeclaredPair, Beside, Robustness, Rounds, Way):
+    for kind in (StudyDesign, TaskDesign, DeclaredPair, Beside, Robustness, Rounds, Way):
         for entry in dataclasses.fields(kind):
             described = any(f"{mark}{entry.name}{end}" in written for mark, end in SHOWN)
             assert described or entry.name in ("name", "digest"), entry.name

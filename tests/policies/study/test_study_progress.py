@@ -13,7 +13,7 @@ from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.training import presets
 from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import DeclaredPair, Flat
+from handrail.policies.study.design import DeclaredPair
 from handrail.policies.study.jobs import StudyCell, jobs
 from handrail.policies.study.progress import StudyProgress
 from handrail.policies.study.settings import evaluations, fingerprint, load_design, recording, training
@@ -80,11 +80,9 @@ def test_every_setting_of_the_design_is_part_of_what_something_depends_on(preset
         return {job.name: fingerprint(job, design) for job in jobs(design)}
 
     others = [dataclasses.replace(design, **{key: value}) for key, value in (
-        ("policy", "diffusion"), ("rollouts", 41), ("persons", 1), ("seed", 1), ("flat", Flat()),
+        ("policy", "diffusion"), ("rollouts", 41), ("persons", 1), ("seed", 1),
         ("beside", None), ("robustness", None), ("draws", 3), ("curve", (5,)),
         ("encoders", dict.fromkeys(design.tasks, "ridgeback_ur10-reach")),
-        *(("flat", Flat(**{name: 0.5})) for name in ("held_out", "improvement")),
-        *(("flat", Flat(**{name: 7})) for name in ("every", "patience")),
     )]  # fmt: skip
     others += [changed(design, **{key: value}) for key, value in (
         ("episodes", 6), ("minutes", 0.2), ("steps", 11), ("batch_size", 4), ("rollout_limit", 9.0),

@@ -54,9 +54,7 @@ def test_from_collecting_to_the_report(ran):
     for name, job in content["jobs"].items():
         assert job["took"]["processor_seconds"] > 0.0
         if name.startswith("policy/"):
-            steps = sorted(map(int, job["result"]["validation"]))
-            assert steps[-1] == job["result"]["steps"] <= 20
-            assert job["result"]["trained_on"]["held_out"] == 5
+            assert job["result"]["steps"] == 20
     for policies in study.glob("policies/**/checkpoints"):
         assert len([path for path in policies.iterdir() if path.name.isdecimal()]) == 1
 
