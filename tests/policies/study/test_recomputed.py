@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tarfile
+from itertools import product
 
 import numpy as np
 import pytest
@@ -79,26 +80,45 @@ def test_the_metric_that_goes_with_success_is_named_first(tmp_path, amounts):
     assert other.startswith("other: ")
 
 
-def test_a_mode_that_needs_twice_the_minutes_is_said_to(tmp_path):
+def share_after(mode, minutes):
+    return 1 / (1 + (6.0 * {"quick": 1.0, "slow": 2.0}[mode] / minutes) ** 2)
+
+
+@pytest.fixture
+def archive(tmp_path):
+    """An archive of a study in which a mode needs twice the minutes."""
     rng = np.random.default_rng(0)
-    for mode, factor in (("quick", 1.0), ("slow", 2.0)):
-        for draw in range(4):
-            for minutes in (3, 5, 10, 20):
-                share = 1 / (1 + (6.0 * factor / minutes) ** 2)
-                rollouts = [{"success": bool(rng.random() < share)} for _ in range(200)]
-                learnt = {"operator_time": 60.0 * minutes, "episodes": 12.0 * minutes / factor}
-                file = tmp_path / f"evaluations/reach/{mode}/{draw}/nominal/realised-time-{minutes}.json"
-                file.parent.mkdir(parents=True, exist_ok=True)
-                arms = {mode: [{"trained_on": learnt, "rollouts": rollouts}]}
-                file.write_text(json.dumps({"arms": arms}))
-    archive = tmp_path / "study.tar.xz"
-    with tarfile.open(archive, "w:xz") as file:
+    for mode, draw, minutes in product(("quick", "slow"), range(4), (3, 5, 10, 20)):
+        rollouts = [{"success": bool(rng.random() < share_after(mode, minutes))} for _ in range(200)]
+        learnt = {"operator_time": 60.0 * minutes, "episodes": minutes * (12.0 if mode == "quick" else 6.0)}
+        file = tmp_path / f"evaluations/reach/{mode}/{draw}/nominal/realised-time-{minutes}.json"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps({"arms": {mode: [{"trained_on": learnt, "rollouts": rollouts}]}}))
+    path = tmp_path / "study.tar.xz"
+    with tarfile.open(path, "w:xz") as file:
         file.add(tmp_path / "evaluations", "evaluations")
-    script = [sys.executable, RESULTS / "minutes.py", archive, "quick", "slow"]
-    done = subprocess.run(script, capture_output=True, text=True, check=True)
-    said = re.findall(r"reach, (\w+): slow / quick (\S+) \((\S+) to (\S+)\), 4 draws", done.stdout)
+    return path
+
+
+def said_by(*script):
+    return subprocess.run([sys.executable, *script], capture_output=True, text=True, check=True).stdout
+
+
+def test_a_mode_that_needs_twice_the_minutes_is_said_to(archive):
+    told = said_by(RESULTS / "minutes.py", archive, "quick", "slow")
+    said = re.findall(r"reach, (\w+): slow / quick (\S+) \((\S+) to (\S+)\), 4 draws", told)
     ratios = {name: [float(each) for each in numbers] for name, *numbers in said}
     for name, true in (("minutes", 2.0), ("demonstrations", 1.0)):
         ratio, low, high = ratios[name]
         assert low < true < high
         assert ratio == pytest.approx(true, rel=0.15)
+
+
+def test_success_over_minutes_is_drawn_and_said(archive, tmp_path):
+    told = said_by(RESULTS / "success.py", tmp_path / "figure.png", archive)
+    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+    points = re.findall(r"reach, (\w+): (\S+) min (\S+) % \((\S+) to (\S+)\), 4 draws", told)
+    assert len(points) == 8
+    for mode, minutes, share, low, high in points:
+        assert float(low) < float(share) < float(high)
+        assert float(share) == pytest.approx(100 * share_after(mode, float(minutes)), abs=6.0)

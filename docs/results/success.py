@@ -1,0 +1,80 @@
+"""Draw the success of policies over the operator's minutes, all modes of several studies in one figure.
+
+`python docs/results/success.py FIGURE.png ARCHIVE.tar.xz …`. A point is a mode with an amount of data in one
+study: the mean over draws, and 95 % by Student's t over these, whose variance is at least that of a draw's
+rollouts by chance. Amounts of the same recordings are joined. It also prints the points.
+"""
+
+import json
+import sys
+import tarfile
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
+from scipy import stats
+
+MARKS = "osD^v"  # a study each
+
+
+def read(archive):
+    """Return (minutes, successes, rollouts) of each draw by (task, mode) and amount; undisturbed ones."""
+    found = defaultdict(lambda: defaultdict(list))
+    with tarfile.open(archive) as files:
+        for each in files:
+            _, *parts = each.name.removeprefix("./").removesuffix(".json").split("/")
+            file = files.extractfile(each)
+            if file and "/nominal/" in each.name and parts[-1].startswith("realised-time"):
+                task, mode, *_, kind = parts
+                ((run,),) = json.load(file)["arms"].values()
+                success = [rollout["success"] for rollout in run["rollouts"]]
+                minutes = run["trained_on"]["operator_time"] / 60.0
+                found[task, mode][kind].append((minutes, sum(success), len(success)))
+    return found
+
+
+def point(draws):
+    """Return minutes, and success in percent with the ends of its interval, from a policy a draw."""
+    minutes, successes, rollouts = np.transpose(draws)
+    share, p = successes / rollouts, (successes.sum() + 2) / (rollouts.sum() + 4)
+    if len(share) < 2:
+        return minutes.mean(), 100 * share.mean(), np.nan, np.nan
+    error = np.sqrt(max(share.var(ddof=1), p * (1 - p) / rollouts.mean()) / len(share))
+    ends = share.mean() + stats.t.ppf((0.025, 0.975), len(share) - 1) * error
+    return minutes.mean(), 100 * share.mean(), *(100 * ends.clip(0.0, 1.0))
+
+
+def main(figure, *archives):
+    """Draw one panel a task, and print a line for each point."""
+    studies = [read(archive) for archive in archives]
+    tasks, modes = (list(dict.fromkeys(key[k] for each in studies for key in each)) for k in (0, 1))
+    drawn = Figure((5.2 * len(tasks), 4.2), layout="constrained")
+    for axes, task in zip(np.atleast_1d(drawn.subplots(1, len(tasks), sharey=True)), tasks, strict=True):
+        for mark, study in zip(MARKS, studies, strict=False):
+            for mode in (mode for mode in modes if (task, mode) in study):
+                points = sorted((*point(rows), len(rows)) for rows in study[task, mode].values())
+                x, y, low, high, _ = np.transpose(points)
+                name = mode if mode not in axes.get_legend_handles_labels()[1] else None
+                style = {"color": f"C{modes.index(mode)}", "marker": mark, "ms": 5, "capsize": 2}
+                beside = x * np.exp(0.015 * (modes.index(mode) - len(modes) / 2))  # side by side
+                axes.errorbar(beside, y, (y - low, high - y), label=name, **style)
+                for minutes, share, *ends, count in points:
+                    span = " to ".join(f"{end:.1f}" for end in ends)
+                    print(f"{task}, {mode}: {minutes:.1f} min {share:.1f} % ({span}), {count} draws")
+        axes.set(title=task.replace("_", " "), xlabel="operator's time [min]", ylim=(-3, 103), xscale="log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.minorticks_off()
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(frameon=False, fontsize=8)
+    drawn.axes[0].set_ylabel("policy success [%], 95 %")
+    drawn.savefig(figure, dpi=110)
+
+
+if missing := [name for name in sys.argv[2:] if not Path(name).is_file()]:
+    sys.exit(f"expected files, got {', '.join(missing)}")
+if len(sys.argv) < 3:
+    sys.exit("expected FIGURE.png ARCHIVE.tar.xz …")
+main(*sys.argv[1:])
