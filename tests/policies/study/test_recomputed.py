@@ -122,3 +122,23 @@ def test_success_over_minutes_is_drawn_and_said(archive, tmp_path):
     for mode, minutes, share, low, high in points:
         assert float(low) < float(share) < float(high)
         assert float(share) == pytest.approx(100 * share_after(mode, float(minutes)), abs=6.0)
+
+
+def test_a_contact_after_the_hand_got_nearer_no_more_is_told_apart(tmp_path):
+    on, lost = {"contacts": 2, "success": False}, [1.0, 0.9] + [0.5] * 8
+    rollouts = [
+        {"contacts": 0, "success": True, "distances": [1.0, 0.5]},
+        on | {"first_contact": 2.5, "distances": lost},  # too early to say
+        on | {"first_contact": 6.0, "distances": lost},  # it had fallen within 5 s
+        on | {"first_contact": 7.95, "distances": lost},
+        on | {"first_contact": 9.0, "distances": [*lost[:5], 0.8, 0.8, 0.8, 0.8, 0.8]},  # it goes elsewhere
+        on | {"first_contact": 9.0, "distances": lost, "success": True},
+    ]
+    file = tmp_path / "evaluations/reach/ee/0/nominal/realised-time.json"
+    file.parent.mkdir(parents=True)
+    file.write_text(json.dumps({"arms": {"ee": [{"rollouts": rollouts}]}}))
+    with tarfile.open(tmp_path / "study.tar.xz", "w:xz") as archive:
+        archive.add(tmp_path / "evaluations", "evaluations")
+    assert said_by(RESULTS / "contacts.py", tmp_path / "study.tar.xz") == (
+        "reach, ee: of 6 rollouts 5 touched something, 3 on the way, 2 after they were lost; 1 succeeded\n"
+    )
