@@ -173,7 +173,7 @@ def _owners(intent: Intent) -> IntArray:
     """Return who commands each channel and gripper, (m + h,); nobody while nobody is listened to."""
     hands = len(intent.grippers)
     owners = np.zeros(len(intent.mask) + hands, np.int64)
-    if intent.time <= LONG_AGO:
+    if intent.time <= LONG_AGO or not intent.is_finite:  # the robot brakes
         return owners
     if not isinstance(intent, Intents):  # the person alone
         return owners + BY_PERSON * _owned(intent)

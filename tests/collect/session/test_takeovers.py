@@ -82,6 +82,7 @@ def test_no_shared_column_is_ever_infinite(number, of_policy):
         features = frame_features("ab", "e", "a", ("base.vx", "ee.vx", "joint.a"), shared=True)
         row = check_frame(frame_row(frame, features), features)
         assert all(np.isfinite(row[name]).all() for name in SHARED)
+        assert row["owner"].any() == row["intervention"] == intent.is_finite  # else nobody is listened to
 
 
 EDITS = {
