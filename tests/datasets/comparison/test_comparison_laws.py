@@ -1,5 +1,6 @@
 """What a comparison claims follows the data: not how many episodes, scenes or comparisons there were."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -223,3 +224,29 @@ def test_a_condition_is_compared_with_the_baseline_of_its_own_kind():
         HandrailError, match="expected a condition 'direct' to compare 'ee' with, got ee, direct same"
     ):
         pairs_between(["ee", "direct same number"], "direct", labels)
+
+
+@pytest.mark.parametrize("metric", OF_GROUP, ids=lambda metric: metric.name)
+def test_a_measure_of_a_dataset_is_its_mean_over_the_frames(metric):
+    generator = rng(5)
+    lengths = (400, *[10] * 9)
+    episodes = []
+    for number, length in enumerate(lengths):
+        states = generator.normal(size=(length, 3)) * (1.0 if length > 10 else 0.05)
+        frames = {"observation.state": states, "action": states[:, :2]}
+        episodes.append(Demonstration(number, INFO, frames, {"length": length, "tasks": ["go"]}))
+    measured = measure({"all": episodes}, rng(0), metrics=[metric])
+    of_frames = metric.measure(measured.groups["all"], rng(0))
+    assert measured.values[metric.name]["all"].estimate == pytest.approx(np.nanmean(of_frames))
+
+
+def test_what_differs_is_detected_however_many_tests_there_are(few_resamples):
+    (length,) = [metric for metric in METRICS if metric.name == "length"]
+    many = [replace(length, name=f"length_{number}") for number in range(101)]
+    short = group("short", 12, rng(6))
+    slow = [replace(each, meta={**each.meta, "length": 3 * each.count}) for each in short.episodes]
+    groups = [Group("slow", INFO, tuple(slow)), short]
+    measured = measure({each.label: each.episodes for each in groups}, rng(0), metrics=many)
+    found = differences(groups, measured, "short", rng(0))
+    assert [each.tests for each in found] == [101] * 101
+    assert all(each.detected for each in found)

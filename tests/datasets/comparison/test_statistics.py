@@ -203,3 +203,38 @@ def test_wrong_evaluations(tmp_path, said, arms, message):
     path.write_text(json.dumps({"format": said, "arms": arms}))
     with pytest.raises(HandrailError, match=message):
         read_evaluations([path])
+
+
+def evaluated(path, seeds, training_seed=0, checkpoint="", **said):
+    """Write an evaluation file of one policy."""
+    policy = {"training_seed": training_seed, "rollouts": [{"seed": seed, "success": True} for seed in seeds]}
+    policy |= {"checkpoint": checkpoint} if checkpoint else {}
+    path.write_text(json.dumps({"format": FORMAT, **said, "arms": {"ee": [policy]}}))
+    return path
+
+
+def test_files_add_up_only_where_they_are_of_the_same(tmp_path):
+    under = {"ee": {"protection": "none", "time_limit": "30"}}
+    one = evaluated(tmp_path / "a", range(5), checkpoint="X", task="reach", conditions=under)
+    plain = evaluated(tmp_path / "b", range(5, 9))  # of a program that says no more
+    (condition,) = read_evaluations([one, plain]).values()
+    assert len(condition.rollouts) == 9
+    mpc = {"ee": {"protection": "mpc", "time_limit": "30"}}
+    for words, others in (
+        ("expected task 'reach' as before, got 'tray'", {"training_seed": 1, "task": "tray"}),
+        ("expected protection 'none' as before, got 'mpc'", {"training_seed": 1, "conditions": mpc}),
+        ("expected checkpoint of draw 0, training seed 0 'X' as before, got 'Y'", {"checkpoint": "Y"}),
+        ("conditions: expected", {"conditions": ["ee"]}),
+    ):
+        other = evaluated(tmp_path / "c", range(5, 9), **others)
+        with pytest.raises(HandrailError, match=words):
+            read_evaluations([one, other])
+
+
+def test_ten_thousand_long_rollouts_can_be_read_again(tmp_path):
+    row = {"success": False, "distances": [0.123] * 120}
+    policy = {"training_seed": 0, "rollouts": [{"seed": seed} | row for seed in range(10_000)]}
+    path = tmp_path / "e.json"
+    path.write_text(json.dumps({"format": FORMAT, "arms": {"ee": [policy]}}, indent=1))
+    (condition,) = read_evaluations([path]).values()
+    assert len(condition.rollouts) == 10_000
