@@ -16,7 +16,6 @@ from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
 from handrail.policies.imitation.evaluation.file import evaluation_table
-from handrail.policies.imitation.evaluation.rollout import _policy
 
 
 @pytest.fixture(scope="module")
@@ -250,7 +249,6 @@ def test_one_command_at_a_time_writes_a_file(folder, tmp_path):
             evaluate(replace(asked, episodes=2), load=load)
         return load(path)
 
-    _policy.cache_clear()
     assert len(rollouts(evaluate(asked, load=another), "ee intent")) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["e.json"]
     assert len(rollouts(evaluate(replace(asked, episodes=2), load=load), "ee intent")) == 2
