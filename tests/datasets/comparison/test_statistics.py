@@ -238,3 +238,9 @@ def test_ten_thousand_long_rollouts_can_be_read_again(tmp_path):
     path.write_text(json.dumps({"format": FORMAT, "arms": {"ee": [policy]}}, indent=1))
     (condition,) = read_evaluations([path]).values()
     assert len(condition.rollouts) == 10_000
+
+
+def test_thousands_of_trials_are_compared_by_a_test_that_takes_no_minutes(monkeypatch):
+    monkeypatch.setattr("scipy.stats.boschloo_exact", pytest.fail)
+    many = unpaired_shares([True] * 900 + [False] * 1100, [True] * 1000 + [False] * 1000)
+    assert many.p == pytest.approx(fisher_exact([[900, 1000], [1100, 1000]]).pvalue)
