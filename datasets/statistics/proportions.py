@@ -6,6 +6,7 @@ data" (2635–2650), method 10 of each.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -96,7 +97,7 @@ def unpaired_shares(
 ) -> Estimate:
     """Compare successes of different trials under two conditions.
 
-    p is Boschloo's; of more than 500 trials each Fisher's, which is never smaller and as good as the same there.
+    p is Boschloo's; of more than 500 trials each Fisher's, which is never smaller and hardly larger there.
 
     Args:
         first: `(N,)`.
@@ -111,7 +112,7 @@ def unpaired_shares(
     trials = [round(each) for each in worth]
     hits = [round(share * count) for share, count in zip(shares, trials, strict=True)]
     table = [hits, [count - hit for count, hit in zip(trials, hits, strict=True)]]
-    exact = stats.boschloo_exact if trials[0] * trials[1] <= _MOST else stats.fisher_exact
+    exact: Any = stats.boschloo_exact if trials[0] * trials[1] <= _MOST else stats.fisher_exact
     share = (one[0] + other[0] + 2) / (one[1] + other[1] + 4)
     spread = np.sqrt(share * (1 - share) * (1 / worth[0] + 1 / worth[1]))
     return Estimate(
