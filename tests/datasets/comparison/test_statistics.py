@@ -10,6 +10,7 @@ from scipy.stats import fisher_exact
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.episodes import at_equal_length
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.comparison.report import sentence
 from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.proportions import (
     newcombe,
@@ -185,6 +186,17 @@ def test_one_training_seed_says_nothing_of_training():
     (difference,) = outcomes.differences
     assert difference.nested is None
     assert outcomes.successes["a"].nested is None
+
+
+@pytest.mark.parametrize("shares", [{"a": [0.9], "b": [0.5]}, {"a": [0.9] * 5, "b": [0.5]}])
+def test_one_training_seed_claims_no_difference(shares):
+    """Trainings differ by 10 to 15 points by chance: with one policy nothing tells that apart from data."""
+    (difference,) = judged(**shares).differences
+    assert difference.estimate == pytest.approx(-0.4, abs=0.05)
+    assert not difference.detected
+    assert (difference.p, difference.seen) == (None, None)
+    told = sentence(difference, "Success")
+    assert told.endswith("not tested: one policy of a condition says nothing of other trainings.")
 
 
 GOOD = {"training_seed": 0, "rollouts": [{"seed": 1, "success": True}]}
