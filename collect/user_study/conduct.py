@@ -195,17 +195,10 @@ class Conductor:
 
     def _card(self, key: str, page: Form, **more: Any) -> dict[str, Any]:
         """Return a page as the cockpit shows it, with `keys`, `pause` and `last` as said or as by default."""
-        plain = {
-            "answers": {},
-            "error": "",
-            "keys": (),
-            "pause": True,
-            "last": False,
-            "note": self._demo_note,
-        }
+        look = {"answers": {}, "error": "", "keys": (), "pause": True, "last": False, "note": self._demo_note}
         text = [" ".join(part.split()) for part in page.text.split("\n\n") if part.strip()]
         items = [asdict(item) for item in page.items]
-        return {"id": key, "title": page.title, "text": text, "items": items, **plain, **more}
+        return {"id": key, "title": page.title, "text": text, "items": items, **look, **more}
 
     def _show_last(self, title: str, text: str) -> None:
         self._cards.show(self._card(f"last/{title}", Form("last", title, text), pause=False, last=True))

@@ -13,7 +13,7 @@ from handrail.datasets.comparison.groups import Group
 from handrail.datasets.quality.measure import Measurements
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.statistics.contrast import Contrast, Estimate, adjusted, contrast
-from handrail.datasets.statistics.resampling import FEWEST, bootstrap, difference_of_means, permutation_p
+from handrail.datasets.statistics.resampling import FEWEST, bootstrap, difference_of_means, p_of_means
 
 Sides = Sequence[FloatArray]  # of both groups
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
@@ -82,7 +82,7 @@ def _compared(
         "counts": (len(one), len(other)),
         "estimate": float(one.mean() - other.mean()),
         "interval": bootstrap((one, other), difference_of_means, paired, rng),
-        "p": permutation_p((one, other), difference_of_means, paired, rng, tests),
+        "p": p_of_means((one, other), paired, rng, tests),
         "spread": float(np.sqrt(np.mean([each.var(ddof=1) for each in values]))),
         "at_length": float(at_length(*places)),
         "at_length_interval": bootstrap(places, at_length, paired, rng),

@@ -36,7 +36,7 @@ from handrail.datasets.statistics.contrast import (
     contrast,
     mean_value,
 )
-from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, difference_of_means, permutation_p
+from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, p_of_means
 
 FORMAT = "handrail.people/3"
 FORMS = "workload and usability"
@@ -176,7 +176,7 @@ def paired_by_scene(one: OfPeople, other: OfPeople, rng: np.random.Generator, te
     enough, zeros, p = len(both) >= FEWEST, np.zeros_like(differences), None
     interval = bootstrap_mean(differences, rng) if enough else None
     if enough and differences.any():
-        p = permutation_p((differences, zeros), difference_of_means, True, rng, tests)
+        p = p_of_means((differences, zeros), True, rng, tests)
     estimate = float(differences.mean()) if both else None
     return Estimate(estimate=estimate, interval=interval, p=p, counts=(len(both),), paired=True)
 

@@ -250,3 +250,20 @@ def test_what_differs_is_detected_however_many_tests_there_are(few_resamples):
     found = differences(groups, measured, "short", rng(0))
     assert [each.tests for each in found] == [101] * 101
     assert all(each.detected for each in found)
+
+
+def test_a_smaller_group_that_varies_more_is_no_difference(few_resamples):
+    """Equal means; permuted differences of means call 29 % of these a difference."""
+    (length,) = [metric for metric in METRICS if metric.name == "length"]
+    generator, (one,) = rng(8), group("", 1, rng(8)).episodes
+
+    def lasting(label, count, spread):
+        seconds = np.maximum(1, generator.normal(1000.0, spread, size=count)).round()
+        return Group(label, INFO, tuple(replace(one, meta={**one.meta, "length": each}) for each in seconds))
+
+    called = 0
+    for _ in range(60):
+        groups = [lasting("few", 20, 300.0), lasting("many", 100, 100.0)]
+        measured = measure({each.label: each.episodes for each in groups}, generator, metrics=[length])
+        called += (differences(groups, measured, "many", generator)[0].p or 0.0) < 0.05
+    assert called <= 8
