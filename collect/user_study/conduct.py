@@ -166,17 +166,17 @@ class Conductor:
         """Return whether a form was filled in, not paused; an answer is kept before the page hears of it.
 
         Args:
-            key: of the card.
+            key: of the card, whose id says also who is asked: a page sends again what is not yet kept.
             asked: the form.
             answers: so far; those to come are added.
             keep: puts an answer on the disk.
             look: of the card.
         """
-        card, error = self._card(key, asked, **look), ""
+        card, error = self._card(f"{self._who.name}/{key}", asked, **look), ""
         while True:
             self._cards.show({**card, "answers": dict(answers), "error": error})
             for said in self._cards.hear():
-                if said.card != key:
+                if said.card != card["id"]:
                     continue  # of a card before, once more
                 if said.item == PAUSE:
                     return False
@@ -195,17 +195,10 @@ class Conductor:
 
     def _card(self, key: str, page: Form, **more: Any) -> dict[str, Any]:
         """Return a page as the cockpit shows it, with `keys`, `pause` and `last` as said or as by default."""
-        plain = {
-            "answers": {},
-            "error": "",
-            "keys": (),
-            "pause": True,
-            "last": False,
-            "note": self._demo_note,
-        }
+        look = {"answers": {}, "error": "", "keys": (), "pause": True, "last": False, "note": self._demo_note}
         text = [" ".join(part.split()) for part in page.text.split("\n\n") if part.strip()]
         items = [asdict(item) for item in page.items]
-        return {"id": key, "title": page.title, "text": text, "items": items, **plain, **more}
+        return {"id": key, "title": page.title, "text": text, "items": items, **look, **more}
 
     def _show_last(self, title: str, text: str) -> None:
         self._cards.show(self._card(f"last/{title}", Form("last", title, text), pause=False, last=True))

@@ -101,11 +101,12 @@ class StudyFolder:
         return known[name]
 
     def welcome(self, name: str) -> Participant:
-        """Return a participant; a newcomer gets the first free row of the design.
+        """Return a participant, of a study that is frozen; a newcomer gets the first free row of the design.
 
         That of somebody who was erased is free again, so that the rows stay balanced.
         """
         check_id(name)
+        self.freeze()  # before anybody has an order
         there = self.participants()
         if name in there:
             if there[name].session.erasing:

@@ -75,7 +75,6 @@ def erase(folder: StudyFolder, name: str) -> str:
 
 def _run(config: StudySessionConfig, folder: StudyFolder, say: Callable[[str], None]) -> None:
     who = folder.welcome(config.participant)
-    folder.freeze()
     if folder.study.demo:
         say(folder.study.source)
     server = open_server(config.cockpit, say)

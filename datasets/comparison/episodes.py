@@ -13,8 +13,9 @@ from handrail.datasets.comparison.groups import Group
 from handrail.datasets.quality.measure import Measurements
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.statistics.contrast import Contrast, Estimate, adjusted, contrast
-from handrail.datasets.statistics.resampling import FEWEST, bootstrap, difference_of_means, permutation_p
+from handrail.datasets.statistics.resampling import FEWEST, bootstrap, difference_of_means, p_of_means
 
+Sides = Sequence[FloatArray]  # of both groups
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
 
 
@@ -57,16 +58,17 @@ def _difference(
     if metric.of_dataset:
         if len(one.values) != len(other.values):
             return ask(Estimate(), reason="it depends on the number of episodes: see the same number")
-        estimate = float(np.nanmean(one.values) - np.nanmean(other.values))
+        estimate = (one.estimate or 0.0) - (other.estimate or 0.0)
         return ask(Estimate(estimate=estimate, counts=counts))
     values = [each.values[places] for each, places in zip(measured, chosen, strict=True)]
     seconds = [np.array([episode.seconds for episode in each.episodes]) for each in (group, base)]
     lengths = [each[places] for each, places in zip(seconds, chosen, strict=True)]
-    return ask(Estimate(), **_compared(values, lengths, bool(pairs), rng))
+    tests = len(measurements.metrics) * (len(measurements.groups) - 1)
+    return ask(Estimate(), **_compared(values, lengths, bool(pairs), rng, tests))
 
 
 def _compared(
-    values: Sequence[FloatArray], lengths: Sequence[FloatArray], paired: bool, rng: np.random.Generator
+    values: Sides, lengths: Sides, paired: bool, rng: np.random.Generator, tests: int
 ) -> dict[str, Any]:
     """Return how means differ, and how much of that the lengths of the episodes account for."""
 
@@ -80,7 +82,7 @@ def _compared(
         "counts": (len(one), len(other)),
         "estimate": float(one.mean() - other.mean()),
         "interval": bootstrap((one, other), difference_of_means, paired, rng),
-        "p": permutation_p((one, other), difference_of_means, paired, rng),
+        "p": p_of_means((one, other), paired, rng, tests),
         "spread": float(np.sqrt(np.mean([each.var(ddof=1) for each in values]))),
         "at_length": float(at_length(*places)),
         "at_length_interval": bootstrap(places, at_length, paired, rng),
@@ -88,7 +90,7 @@ def _compared(
     }
 
 
-def at_equal_length(values: Sequence[FloatArray], lengths: Sequence[FloatArray]) -> FloatArray:
+def at_equal_length(values: Sides, lengths: Sides) -> FloatArray:
     """Return differences of means at equal length: ȳ₁ − ȳ₂ − β (L̄₁ − L̄₂), β the slope within groups, `(…)`.
 
     β = Σ_g Σ (L − L̄_g)(y − ȳ_g) / Σ_g Σ (L − L̄_g)²: the analysis of covariance. Values and lengths are of
@@ -106,7 +108,7 @@ def at_equal_length(values: Sequence[FloatArray], lengths: Sequence[FloatArray])
     return one - other - slope * (one_length - other_length)
 
 
-def _follows(values: Sequence[FloatArray], lengths: Sequence[FloatArray]) -> float:
+def _follows(values: Sides, lengths: Sides) -> float:
     """Return the correlation of ranks within groups, all groups together; 0 where nothing varies."""
     ranks = [[stats.rankdata(each) / len(each) - 0.5 for each in side] for side in (values, lengths)]
     one, other = (np.concatenate([each - each.mean() for each in side]) for side in ranks)

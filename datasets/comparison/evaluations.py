@@ -3,11 +3,13 @@
     {
       "format": "handrail.evaluations/1",
       "task": "reach",                              what was evaluated, optional
+      "conditions": {"ee": {"protection": "none"}},  what its rollouts have in common, by label, optional
       "arms": {                                      the conditions
         "ee": [                                     a dataset's or a mode's label
           {
             "training_seed": 0,
             "dataset_draw": 0,                      which resample of the dataset, optional
+            "checkpoint": "3f2a",                   which policy it was, optional
             "trained_on": {"episodes": 50, "operator_time": 312.5},     optional, [s]
             "rollouts": [{"seed": 1000, "success": true, "contacts": 0, "length": 4.2}, …]
           }, …
@@ -16,7 +18,8 @@
     }
 
 A rollout needs `seed` and `success`; other numbers (`contacts`, `length` [s], …) are outcomes too, reported
-where every rollout of a condition has them. Several files add up; the same rollout twice is an error.
+where every rollout of a condition has them. Several files add up; the same rollout twice is an error, and so
+is another task, another policy or anything else in `conditions` under the same label.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -34,6 +37,7 @@ from handrail.datasets.statistics.resampling import Run
 from handrail.datasets.storage.strict_json import load_json
 
 FORMAT = "handrail.evaluations/1"
+MOST_BYTES = 512 << 20  # of a file: some 300,000 rollouts that lasted long
 SUCCESS = "success"
 Rollout = Mapping[str, Any]
 OUTCOMES: Mapping[str, Callable[[Rollout], float]] = {
@@ -53,6 +57,7 @@ class _Policy(msgspec.Struct):
     rollouts: Annotated[list[dict[str, Any]], Meta(min_length=1)]
     dataset_draw: int = 0
     trained_on: dict[str, float] | None = None
+    checkpoint: str = ""
 
 
 _Policies = Annotated[list[_Policy], Meta(min_length=1)]
@@ -121,18 +126,25 @@ class Condition:
 def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Condition]:
     """Return the conditions of evaluation files by label, in the order in which they come."""
     found: dict[str, dict[tuple[int, int], Policy]] = {}
+    kinds = dict[tuple[str, str], Any]()
     for path in map(Path, paths):
         where = f"evaluations {str(path)!r}"
-        content = load_json(path.expanduser(), "evaluations of policies")
+        content = load_json(path.expanduser(), "evaluations of policies", MOST_BYTES)
         given = content.get("format") if isinstance(content, dict) else None
         if given != FORMAT:
             raise HandrailError(f"{where}: expected the format {FORMAT!r}, got {given!r}")
         arms = content.get("arms")
         if not isinstance(arms, dict) or not arms:
             raise HandrailError(f"{where}: expected 'arms' with one label or more")
+        under = check(content.get("conditions", {}), dict[str, dict[str, Any]], f"{where}: conditions")
         for label, entries in arms.items():
             of = f"{where}: condition {label!r}"
             for entry in check(entries, _Policies, of):
+                policy = f"checkpoint of draw {entry.dataset_draw}, training seed {entry.training_seed}"
+                said = {"task": content.get("task", ""), policy: entry.checkpoint} | under.get(label, {})
+                for name, value in said.items():
+                    if value and value != (before := kinds.setdefault((label, name), value)):
+                        raise HandrailError(f"{of}: expected {name} {before!r} as before, got {value!r}")
                 _add(found.setdefault(label, {}), entry, of)
     return {label: Condition(label, tuple(known.values())) for label, known in found.items()}
 

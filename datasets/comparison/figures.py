@@ -4,6 +4,7 @@ What is better is always right.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import cycle
 from typing import Any
@@ -165,7 +166,8 @@ def _metric(comparison: Comparison, metric: Measure) -> Panel:
 def trajectory_panels(comparison: Comparison) -> list[Panel]:
     """Return paths from above of each group, the same axes alike; none where no motion is recorded."""
     groups = comparison.everything.groups
-    paths = [_paths(group, comparison.colours[group.label]) for group in groups if _has_motion(group)]
+    drawn = (_paths(group, comparison.colours[group.label]) for group in groups)
+    paths = [panel for panel in drawn if panel.figure.axes[0].lines]
     alike: dict[tuple[str, str], list[Any]] = {}
     for axes in (panel.figure.axes[0] for panel in paths):
         alike.setdefault((axes.get_xlabel(), axes.get_ylabel()), []).append(axes)
@@ -177,22 +179,16 @@ def trajectory_panels(comparison: Comparison) -> list[Panel]:
     return paths
 
 
-def _has_motion(group: Group) -> bool:
-    try:
-        return any(episode.motion.shape[1] > 0 for episode in each_opened(group.episodes[:1]))
-    except DoesNotApply:
-        return False
-
-
 def _paths(group: Group, colour: str) -> Panel:
     axes = new_figure(_WIDTH, 2.6).subplots()
     for episode in each_opened(group.episodes[:_SHOWN]):
         line = _FAILED if episode.success is False else colour
         for hand, style in zip(episode.hands or ("",), cycle(_STYLES.values())):
-            motion = (episode.of_hand(hand) if hand else episode).motion
-            x, y = motion[:, 0], motion[:, 1] if motion.shape[1] > 1 else np.zeros(len(motion))
-            axes.plot(x, y, color=line, lw=1.0, alpha=0.7, ls=style)
-            axes.plot(x[-1], y[-1], "o", color=line, ms=3)
+            with suppress(DoesNotApply):
+                motion = (episode.of_hand(hand) if hand else episode).motion
+                x, y = motion[:, 0], motion[:, 1] if motion.shape[1] > 1 else np.zeros(len(motion))
+                axes.plot(x, y, color=line, lw=1.0, alpha=0.7, ls=style)
+                axes.plot(x[-1], y[-1], "o", color=line, ms=3)
     (first,) = each_opened(group.episodes[:1])
     names = ("tool x [m]", "tool y [m]") if first.motion_is_tool else _first_names(first)
     axes.set(xlabel=short(names[0], _AXIS_LABEL), ylabel=short(names[1], _AXIS_LABEL))

@@ -36,7 +36,7 @@ from handrail.datasets.statistics.contrast import (
     contrast,
     mean_value,
 )
-from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, difference_of_means, permutation_p
+from handrail.datasets.statistics.resampling import FEWEST, bootstrap_mean, p_of_means
 
 FORMAT = "handrail.people/3"
 FORMS = "workload and usability"
@@ -133,6 +133,7 @@ def compared(
         rng: Of resampling and permutation.
     """
     scripted = list(dict.fromkeys(each.condition for each in trials if not each.participant))
+    tests = len(measures) * (len(labels) - 1)
     values: list[Value] = []
     contrasts: list[Contrast] = []
     for measure in measures:
@@ -146,8 +147,8 @@ def compared(
             drawn = [t.values[measure.name] for t in trials if (t.condition, t.participant) == (label, "")]
             values.append(mean_value(measure, f"{label}, scripted", np.array(drawn), rng, scope=scope))
         contrasts += [
-            contrast(found[label], found[baseline], paired_by_scene(people[label], people[baseline], rng))
-            for label in labels
+            contrast(found[label], found[baseline], paired_by_scene(scenes, people[baseline], rng, tests))
+            for label, scenes in people.items()
             if label != baseline and baseline in people
         ]
     return values, adjusted(replace(each, family=scope) for each in contrasts)
@@ -164,7 +165,7 @@ def _of_people(trials: Sequence[Trial], label: str, measure: str) -> OfPeople:
     return found
 
 
-def paired_by_scene(one: OfPeople, other: OfPeople, rng: np.random.Generator) -> Estimate:
+def paired_by_scene(one: OfPeople, other: OfPeople, rng: np.random.Generator, tests: int = 1) -> Estimate:
     """Return how a condition differs from the baseline, paired by participant, and by scene where possible.
 
     d_p = mean over the scenes that participant p met under both; where they met none twice, the difference of
@@ -175,7 +176,7 @@ def paired_by_scene(one: OfPeople, other: OfPeople, rng: np.random.Generator) ->
     enough, zeros, p = len(both) >= FEWEST, np.zeros_like(differences), None
     interval = bootstrap_mean(differences, rng) if enough else None
     if enough and differences.any():
-        p = permutation_p((differences, zeros), difference_of_means, True, rng)
+        p = p_of_means((differences, zeros), True, rng, tests)
     estimate = float(differences.mean()) if both else None
     return Estimate(estimate=estimate, interval=interval, p=p, counts=(len(both),), paired=True)
 
@@ -194,7 +195,7 @@ def _difference(one: Scenes, other: Scenes) -> float:
 
 def _within_reach(contrasts: Sequence[Contrast]) -> bool:
     """Return whether any difference could be detected: if all participants differ alike, p is 2¹⁻ⁿ."""
-    return any(each.tests * 2.0 ** (1 - each.counts[0]) < LEVEL for each in contrasts if each.p is not None)
+    return any(each.tests * 2.0 ** (1 - each.counts[0]) < LEVEL for each in contrasts if each.interval)
 
 
 def _limits(
@@ -208,12 +209,13 @@ def _limits(
     count, strangers = len(participants), {each.participant for each in study.scores} - set(participants)
     tasks = dict.fromkeys(trial.task for trial in trials)
     scopes = [[each for each in contrasts if each.scope == scope] for scope in (*tasks, FORMS)]
-    reach = all(map(_within_reach, scopes))
+    reach = all(_within_reach(found) for found in scopes if any(each.counts[0] for each in found))
     return {
         f"Participants: {count}. Intervals and tests need {FEWEST} or more, so there are none.": count
         < FEWEST,
         f"Participants: {count}. Too few to detect any difference in some tables.": count >= FEWEST
         and not reach,
+        f"Participants: {count}. Below 20, intervals are rough: of 5, some 84 % hold.": FEWEST <= count < 20,
         _SCRIPTED: any(not trial.participant for trial in trials),
         _ALONE: not all(scopes[:-1]),
         "No scores yet: exports/scores.csv is not there.": not study.scores,

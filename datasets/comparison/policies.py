@@ -25,6 +25,7 @@ from handrail.datasets.statistics.resampling import Run, percentiles, resample_r
 
 LIKE_FOR_LIKE, MIXED = "like-for-like", "mixed"  # families: mixed policies differ in more than their data
 POLICIES = "policies"
+_ALONE = "not tested: one policy of a condition says nothing of other trainings"
 POLICY_SUCCESS = Measure("policy_success", "success of policies", SHARE, "higher", "share of rollouts")
 
 
@@ -125,14 +126,14 @@ def _difference(
 
     `interval` is over all rollouts, as if these policies were all there is; `nested` over dataset draw,
     training seed and evaluation seed, the wider of the nested bootstrap's and Welch's t interval over
-    replicates; None where a condition has one replicate. p is the largest of the exact test's, the nested
-    bootstrap's, and Welch's: resampling a handful of training seeds alone would see too much.
+    replicates. p is the largest of the exact test's, the nested bootstrap's, and Welch's: resampling a
+    handful of training seeds alone would see too much. Where a condition has one replicate there is neither.
     """
     both = runs[pair.label], runs[pair.baseline]
     names = {"measure": POLICY_SUCCESS, "scope": POLICIES}
     found = Contrast(**vars(pair), **names, **vars(compare_rollouts(*both)))
     if min(len(replicates(each)) for each in both) < 2:
-        return found
+        return replace(found, p=None, errors=(), reason=_ALONE)
     nested = resampled[pair.label] - resampled[pair.baseline]
     tail = (1 + min(np.count_nonzero(nested <= 0), np.count_nonzero(nested >= 0))) / (len(nested) + 1)
     error, freedom = standard_error(both)

@@ -94,7 +94,7 @@ def sentence(each: Contrast, name: str, *sides: str) -> str:
     if interval is None:
         return f"{name}: {told}; one draw tests nothing."
     seen = f"{'a' if each.detected else 'no'} difference detected"
-    verdict = "not tested before all draws are done" if each.p_adjusted is None else seen
+    verdict = each.reason or "not tested before all draws are done" if each.p_adjusted is None else seen
     return f"{name}: {told} (95 % {_interval(each.measure, interval)}), {verdict}."
 
 

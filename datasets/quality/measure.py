@@ -2,11 +2,11 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.episode_set import EpisodeSet, frames_of
 from handrail.datasets.quality.metric import Metric
@@ -142,22 +142,22 @@ def _measure(metric: Metric, episode: Demonstration, where: Sequence[tuple[Episo
 
 def _value(metric: Metric, label: str, scope: str, group: EpisodeSet, rng: np.random.Generator) -> Value:
     if metric.of_dataset:
-        values, reason = _of_dataset(metric, group, rng)
-        return mean_value(metric, label, values, None, scope=scope, reason=reason)
+        return _of_dataset(metric, label, scope, group, rng)
     found = group.found[metric.name]
     values = np.array([np.nan if isinstance(each, str) else each for each in found])
     reasons = Counter(each for each in found if isinstance(each, str)).most_common(1)
     return mean_value(metric, label, values, rng, scope=scope, reason=reasons[0][0] if reasons else "")
 
 
-def _of_dataset(metric: Metric, group: EpisodeSet, rng: np.random.Generator) -> tuple[FloatArray, str]:
-    """Return the mean over the frames of each episode, NaN where it has none, and why there are none."""
-    count = len(group.episodes)
+def _of_dataset(metric: Metric, label: str, scope: str, group: EpisodeSet, rng: np.random.Generator) -> Value:
+    """Return the mean over the frames, and that of each episode, NaN where it has none."""
+    count, ask = len(group.episodes), partial(mean_value, metric, label, rng=None, scope=scope)
     try:
         values = metric.measure(group, rng)
     except DoesNotApply as error:
-        return np.full(count, np.nan), str(error)
+        return ask(np.full(count, np.nan), reason=str(error))
     known, owner = np.isfinite(values), group.owner
     counts = np.bincount(owner[known], minlength=count)
     sums = np.bincount(owner[known], weights=values[known], minlength=count)
-    return np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0), ""
+    means = np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0)
+    return replace(ask(means), estimate=float(values[known].mean()) if known.any() else None)

@@ -16,7 +16,7 @@ def sparc(speed: np.ndarray, fs: float) -> float:
     """Return the spectral arc length: 0 is smoothest, more negative is less smooth.
 
     −∫₀^ωc √((1/ωc)² + (dV̂/dω)²) dω, where V̂ is the amplitude spectrum over its value at its peak and ωc the
-    highest frequency up to 10 Hz at which V̂ ≥ 0.05. Independent of duration and scale.
+    highest frequency up to 10 Hz, and to fs/2, at which V̂ ≥ 0.05. Independent of duration and scale.
 
     Args:
         speed: Speed, `(N,)`, in any unit.
@@ -30,7 +30,7 @@ def sparc(speed: np.ndarray, fs: float) -> float:
     size = 2 ** (int(np.ceil(np.log2(len(speed)))) + ZERO_PADDING)
     spectrum = np.abs(np.fft.fft(speed, size))
     frequency = np.arange(size) * fs / size
-    low = frequency <= CUTOFF
+    low = frequency <= min(CUTOFF, 0.5 * fs)
     amplitude, frequency = spectrum[low] / spectrum.max(), frequency[low]
     above = np.flatnonzero(amplitude >= AMPLITUDE_THRESHOLD)
     if not above.size or above[0] == above[-1]:

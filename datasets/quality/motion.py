@@ -100,10 +100,11 @@ def phase_boundaries(episode: Demonstration) -> IntArray:
     Where the recorded phase changes; without one, where a gripper opens or closes; without either or where
     none ever does, at the frame that is farthest from the start, so that there-and-back has two phases.
     """
-    if episode.has("phase"):
-        return _changes(episode.column("phase").reshape(episode.count, -1)[:, 0])
     try:
-        states = (gripper_state(each) for each in episode.grippers.T)
+        if episode.has("phase"):
+            states = [episode.column("phase").reshape(episode.count, -1)[:, 0]]
+        else:
+            states = [gripper_state(each) for each in episode.grippers.T]
         found = np.unique(np.concatenate([_changes(each) for each in states]))
     except DoesNotApply:
         found = np.empty(0, int)

@@ -25,7 +25,7 @@ def contacts(episode: Demonstration, scale: Scale) -> float:
 
     The sum of all rises of their number.
     """
-    return float(np.maximum(np.diff(episode.numbers("contacts")[:, 0], prepend=0.0), 0.0).sum())
+    return float(np.maximum(np.diff(_finite(episode, "contacts"), prepend=0.0), 0.0).sum())
 
 
 @metric("N s", "lower", title="contact impulse")

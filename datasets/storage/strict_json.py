@@ -15,26 +15,27 @@ MOST_DEPTH = 50
 _TOO_DEEP = f"expected JSON nested at most {MOST_DEPTH} deep, got more"
 
 
-def read_json(path: Path) -> Any:
-    """Return what a file says; see `parse_json`.
+def read_json(path: Path, most: int = MOST_BYTES) -> Any:
+    """Return what a file of at most so many bytes says; see `parse_json`.
 
     Raises:
         OSError: It is not there, cannot be read, or is no regular file.
         ValueError: `parse_json` refuses it; one line.
     """
     with open_regular(path) as file:
-        return parse_json(file.read(MOST_BYTES + 1))
+        return parse_json(file.read(most + 1), most)
 
 
-def load_json(path: Path, what: str) -> Any:
+def load_json(path: Path, what: str, most: int = MOST_BYTES) -> Any:
     """Return what a file says that is no part of a dataset.
 
     Args:
         path: of the file.
         what: it is, for the error: `a policy of handrail-train`.
+        most: bytes that it may have.
     """
     try:
-        return read_json(path)
+        return read_json(path, most)
     except (OSError, ValueError) as error:
         raise HandrailError(f"{str(path)!r}: expected {what}, got {message_of(error)}") from error
 
@@ -68,14 +69,14 @@ def json_bytes(content: Any) -> bytes:
     return msgspec.json.format(json.dumps(content, ensure_ascii=False, allow_nan=False).encode(), indent=4)
 
 
-def parse_json(data: bytes) -> Any:
+def parse_json(data: bytes, most: int = MOST_BYTES) -> Any:
     """Return a JSON text as Python values.
 
     Raises:
         ValueError: It is no JSON, has NaN or an infinity in it, or is too large or too deep; one line.
     """
-    if len(data) > MOST_BYTES:
-        raise ValueError(f"expected at most {MOST_BYTES >> 20} MB of JSON, got more")
+    if len(data) > most:
+        raise ValueError(f"expected at most {most >> 20} MB of JSON, got more")
     try:
         content = msgspec.json.decode(data)
     except RecursionError as error:

@@ -97,3 +97,9 @@ def test_corrections_are_counted_when_they_switch():
 def test_what_is_no_command_has_no_chattering(command):
     assert np.isnan(rate_of_change(command, 50.0))
     assert np.isnan(high_frequency_content(command, 50.0))
+
+
+@pytest.mark.parametrize("fs", [5.0, 8.0, 10.0, 15.0, 20.0, 100.0])
+def test_smoothness_does_not_hang_on_the_frame_rate(fs):
+    time = np.arange(0, 1, 1 / (4 * fs))
+    assert sparc(30 * time**2 - 60 * time**3 + 30 * time**4, fs) == pytest.approx(-1.41, abs=0.05)

@@ -62,6 +62,12 @@ def test_efficiency_is_a_share_and_more_phases_never_lower_it(seed, count):
     assert parts <= 1.0 + 1e-12
 
 
+@pytest.mark.parametrize("parts", [{}, {"phase": np.zeros(60, int)}])
+def test_out_and_back_in_one_phase_is_not_zero_either(parts):
+    there = np.linspace([0.0, 0.0, 0.0], [1.0, 2.0, 3.0], 30)
+    assert value(motion.path_efficiency, state=np.vstack([there, there[::-1]]), **parts) > 0.9
+
+
 def test_the_gripper_changes_where_it_is_sure():
     opening = np.array([0.5, 1.0, 0.7, 0.8, 0.4, 0.2, 0.6, 0.0, 0.9])
     assert motion.gripper_state(opening).tolist() == [1, 1, 1, 1, 1, 0, 0, 0, 1]
@@ -183,6 +189,10 @@ def test_safety():
     assert value(safety.slack_used, slack=np.full(4, 1e-12)) == 0.0
 
 
+def test_a_contact_that_was_not_measured_is_none():
+    assert value(safety.contacts, contacts=np.array([0.0, 1.0, np.nan, 1.0, 0.0, 2.0])) == 3.0
+
+
 def steered(metric, inputs, scale):
     return value(metric, {"input_scale": scale}, asked=inputs)
 
@@ -260,6 +270,7 @@ REFUSED = [
     (lambda: saturation(BUTTONS, np.zeros(1), np.zeros(1)), "two values"),
     (lambda: value(tracking.variation_ratio, action=ROWS, state=np.ones((40, 2))), "never changes"),
     (lambda: value(safety.smallest_distance, distance=np.full(3, np.nan)), "finite"),
+    (lambda: value(safety.contacts, contacts=np.full(3, np.nan)), "finite"),
     (lambda: steered(effort.input_effort, ROWS, np.zeros(2)), "ever used"),
     (
         lambda: value(effort.round_trip, device=np.array(["keys"] * 3), round_trip=np.zeros(3)),

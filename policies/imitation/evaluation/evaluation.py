@@ -1,6 +1,7 @@
 """Evaluates trained policies: every checkpoint under every condition on the same declared seeds."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -15,6 +16,8 @@ from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
+from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.file import EvaluationFile
@@ -58,41 +61,46 @@ def evaluate(
         HandrailError: a setting is wrong, no policy could be evaluated, or the file cannot be written.
     """
     config.check()
-    conditions, refused = policy_conditions(config)
-    file = EvaluationFile(Path(config.json).expanduser() if config.json else None, conditions)
-    asked = {
-        f"{each.label} of {each.checkpoint.folder}, seed {seed}": (each, seed)
-        for each in conditions
-        for seed in config.seeds
-        if seed not in file.done(each)
-    }
-    failed, successes, saved = dict[Path, str](), 0, monotonic()
+    path, alone = Path(config.json).expanduser() if config.json else None, nullcontext()
+    if path:
+        with explained(f"--json {path}"):
+            alone = DatasetLock(path.with_name(f".{path.name}.lock"), "rollouts in", "handrail-evaluate")
+    with alone:
+        conditions, refused = policy_conditions(config)
+        file = EvaluationFile(path, conditions)
+        asked = {
+            f"{each.label} of {each.checkpoint.folder}, seed {seed}": (each, seed)
+            for each in conditions
+            for seed in config.seeds
+            if seed not in file.done(each)
+        }
+        failed, successes, saved = dict[Path, str](), 0, monotonic()
 
-    def wanted(job: Job) -> bool:
-        return asked[job.name][0].checkpoint.folder not in failed
+        def wanted(job: Job) -> bool:
+            return asked[job.name][0].checkpoint.folder not in failed
 
-    jobs = [Job(name, run_rollout, (*rollout, load)) for name, rollout in asked.items()]
-    try:
-        with Execution(config, "rollouts", console, _PRELOAD) as execution:
-            for count, result in enumerate(execution.run(jobs, wanted), start=1):
-                condition, _ = asked[result.job.name]
-                if result.error:
-                    failed.setdefault(condition.checkpoint.folder, result.error)
-                    continue
-                file.add(condition, result.value)
-                successes += result.value["success"]
-                execution.say(f"{successes}/{count} succeeded")
-                if monotonic() - saved > _SAVE_EVERY:
-                    file.save()
-                    saved = monotonic()
-    finally:
-        file.save()
-    refused += failed.values()
-    if refused and not file.content["arms"]:
-        raise HandrailError("; ".join(refused))
-    if refused:
-        raise UnevaluatedError(file.content, refused)
-    return file.content
+        jobs = [Job(name, run_rollout, (*rollout, load)) for name, rollout in asked.items()]
+        try:
+            with Execution(config, "rollouts", console, _PRELOAD) as execution:
+                for count, result in enumerate(execution.run(jobs, wanted), start=1):
+                    condition, _ = asked[result.job.name]
+                    if result.error:
+                        failed.setdefault(condition.checkpoint.folder, result.error)
+                        continue
+                    file.add(condition, result.value)
+                    successes += result.value["success"]
+                    execution.say(f"{successes}/{count} succeeded")
+                    if monotonic() - saved > _SAVE_EVERY:
+                        file.save()
+                        saved = monotonic()
+        finally:
+            file.save()
+        refused += failed.values()
+        if refused and not file.content["arms"]:
+            raise HandrailError("; ".join(refused))
+        if refused:
+            raise UnevaluatedError(file.content, refused)
+        return file.content
 
 
 def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_policy) -> str:

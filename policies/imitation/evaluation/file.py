@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.comparison.evaluations import FORMAT, MOST_BYTES, read_evaluations
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.storage.atomic import explained, write_whole
@@ -44,12 +44,10 @@ class EvaluationFile:
         self.content: dict[str, Any] = {"format": FORMAT, "conditions": {}, "arms": {}}
         if path is not None and path.exists():
             read_evaluations([path])
-            self.content |= read_json(path)
-            if not isinstance(self.content["conditions"], dict):
-                raise HandrailError(f"--json {path}: expected conditions by label, got others")
+            self.content |= read_json(path, MOST_BYTES)
         task = self.content.setdefault("task", conditions[0].checkpoint.meta.environment)
         for condition in conditions:
-            label, checkpoint, entry = condition.label, condition.checkpoint, self._entry(condition)
+            label, checkpoint = condition.label, condition.checkpoint
             where = f"--json {self._path}: condition {label!r}"
             if checkpoint.meta.environment != task:
                 raise HandrailError(f"{where}: expected task {task}, got {checkpoint.meta.environment}")
@@ -58,17 +56,17 @@ class EvaluationFile:
                 raise HandrailError(
                     f"{where}: expected {before}, got {condition.conditions}; say another --label"
                 )
-            if entry and entry.get("checkpoint") != checkpoint.digest:
+            if any(entry.get("checkpoint") != checkpoint.digest for entry in self._entries(condition)):
                 raise HandrailError(f"{where}: has another policy of dataset draw, seed {checkpoint.key}")
 
     def done(self, condition: PolicyCondition) -> set[int]:
         """Return the seeds that have been run."""
-        return {row["seed"] for row in (self._entry(condition) or {"rollouts": ()})["rollouts"]}
+        return {row["seed"] for entry in self._entries(condition) for row in entry["rollouts"]}
 
     def add(self, condition: PolicyCondition, row: dict[str, Any]) -> None:
         """Add a rollout; they are kept in the order of their seeds."""
-        entry, checkpoint = self._entry(condition), condition.checkpoint
-        if entry is None:
+        entries, checkpoint = self._entries(condition), condition.checkpoint
+        if not entries:
             draw, seed = checkpoint.key
             entry = {
                 "training_seed": seed,
@@ -77,10 +75,11 @@ class EvaluationFile:
                 "checkpoint": checkpoint.digest,
                 "rollouts": [],
             }
+            entries.append(entry)
             self.content["conditions"][condition.label] = condition.conditions
             self.content["arms"].setdefault(condition.label, []).append(entry)
-        entry["rollouts"].append(row)
-        entry["rollouts"].sort(key=lambda rollout: rollout["seed"])
+        entries[0]["rollouts"].append(row)
+        entries[0]["rollouts"].sort(key=lambda rollout: rollout["seed"])
 
     def save(self) -> None:
         """Write everything, so that a reader sees the old file or the new one, whole."""
@@ -88,11 +87,14 @@ class EvaluationFile:
             with explained(f"--json {self._path}"):
                 write_whole(self._path, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
 
-    def _entry(self, condition: PolicyCondition) -> dict[str, Any] | None:
-        for entry in self.content["arms"].get(condition.label, ()):
-            if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == condition.checkpoint.key:
-                return entry
-        return None
+    def _entries(self, condition: PolicyCondition) -> list[dict[str, Any]]:
+        """Return what there is of a policy: one entry, or more of them in a file put together by hand."""
+        known = self.content["arms"].get(condition.label, ())
+        return [entry for entry in known if _key(entry) == condition.checkpoint.key]
+
+
+def _key(entry: Mapping[str, Any]) -> tuple[int, int]:
+    return entry.get("dataset_draw", 0), entry["training_seed"]
 
 
 def evaluation_table(content: Mapping[str, Any]) -> Table:
@@ -102,19 +104,18 @@ def evaluation_table(content: Mapping[str, Any]) -> Table:
         content: of an evaluation file.
     """
     rollouts = [row for entries in content["arms"].values() for entry in entries for row in entry["rollouts"]]
-    lines = [
-        (label, str(len(entries)), *_cells([row for entry in entries for row in entry["rollouts"]]))
-        for label, entries in content["arms"].items()
-    ]
+    lines = [(label, *_cells(entries)) for label, entries in content["arms"].items()]
     return Table(_HEADINGS, lines, str(content.get("task", "")), _caption(rollouts))
 
 
-def _cells(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+def _cells(entries: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    rows = [row for entry in entries for row in entry["rollouts"]]
     successes = sum(row["success"] for row in rows)
     low, high = wilson(successes, len(rows))
     times = [row["time_to_success"] for row in rows if "time_to_success" in row]
     reasons = Counter(row.get("failure_reason") or "unknown" for row in rows if not row["success"])
     return (
+        str(len(set(map(_key, entries)))),
         f"{successes}/{len(rows)} = {successes / len(rows):.0%}",
         f"{low:.0%} – {high:.0%}",
         f"{np.median(times):.1f}" if times else "–",

@@ -20,8 +20,11 @@ from user_study_helpers import (
 from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.user_study.conduct import Ending
+from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.design import DEMO_NOTE
+from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import plan, practice_seed, trial_seed
+from handrail.collect.user_study.run import study_session
 from handrail.controllers.errors import HandrailError
 
 GUILLOTINE = Guillotine()
@@ -130,9 +133,33 @@ def test_a_form_that_is_paused_keeps_what_was_answered(tmp_path):
     ending, _, _ = session(folder, "P001", half)
     assert ending is Ending.PAUSED
     key = next(card["id"] for card in half.cards if card["id"].endswith("/questions"))
-    assert list(folder.participant("P001").answers(key)) == ["trust"]
+    assert list(folder.participant("P001").answers(key.removeprefix("P001/"))) == ["trust"]
     _, desk, _ = session(folder, "P001")
     assert desk.cards[0]["answers"]["trust"] == half.kept[key]["trust"]
+
+
+def test_no_card_of_one_participant_takes_an_answer_of_another(tmp_path):
+    folder = study_folder(tmp_path)
+    asked = [session(folder, name)[1].cards for name in ("P001", "P002")]
+    one, other = ({card["id"] for card in cards if card.get("items")} for cards in asked)
+    assert len(one) == len(other) == 3
+    assert (
+        not one & other
+    )  # a page whose server was lost sends again what was not kept, to whoever comes next
+
+
+def test_nobody_begins_in_a_study_that_is_not_frozen(tmp_path, monkeypatch):
+    folder = study_folder(tmp_path)
+
+    def full(*_):
+        raise HandrailError("the disk is full")
+
+    monkeypatch.setattr(StudyFolder, "freeze", full)
+    with pytest.raises(HandrailError, match="the disk is full"):
+        study_session(StudySessionConfig("run", str(tmp_path), "P001"))
+    assert not folder.participants()
+    with pytest.raises(HandrailError, match="expected an id"):
+        study_session(StudySessionConfig("run", str(tmp_path), "Anna"))
 
 
 def half_answered(desk):
@@ -149,10 +176,10 @@ def test_wrong_late_and_early_answers_change_nothing(tmp_path):
     desk = SyntheticDesk("P001")
     odd = [
         CardAnswer("another/card", "trust", 3),
-        CardAnswer("consent", ":next", True),
-        CardAnswer("consent", "consent", None),
-        CardAnswer("consent", "consent", "perhaps"),
-        CardAnswer("consent", "nothing", 1),
+        CardAnswer("P001/consent", ":next", True),
+        CardAnswer("P001/consent", "consent", None),
+        CardAnswer("P001/consent", "consent", "perhaps"),
+        CardAnswer("P001/consent", "nothing", 1),
     ]
     errors = []
     honest = desk.hear
@@ -175,7 +202,9 @@ def killed_and_resumed(root, k):
     if (root / "participants" / "P001" / "session.json").exists():
         who = folder.participant("P001")
         for key, kept in desk.kept.items():
-            assert kept.items() <= who.answers(key).items(), f"an answer was lost at change {k}"
+            assert kept.items() <= who.answers(key.removeprefix("P001/")).items(), (
+                f"an answer was lost at change {k}"
+            )
     before = trials(folder) if (root / "study.json").exists() else []
     _, _, track = session(folder, "P001")
     assert trials(folder) == wanted(folder, "P001")
@@ -184,9 +213,8 @@ def killed_and_resumed(root, k):
     assert len(table(folder, "trials")) == 2
     for card in desk.cards:
         for item in card.get("items", ()):
-            assert folder.participant("P001").answers(card["id"])[item["name"]] == answer_of(
-                "P001", card["id"], item
-            )
+            kept = folder.participant("P001").answers(card["id"].removeprefix("P001/"))
+            assert kept[item["name"]] == answer_of("P001", card["id"], item)
     return lived
 
 

@@ -145,6 +145,16 @@ def test_what_cannot_be_detected_is_said(six):
     assert (same.estimate, same.interval, same.p) == (0.0, (0.0, 0.0), None)
 
 
+def test_nothing_is_said_of_tables_that_are_empty(tmp_path):
+    few, missing = "Too few to detect any difference", "No scores yet"
+    data = {("reach", mode): people(8, lambda place: 40 + place) for mode in ("direct", "ee")}
+    comparison = compare_people(CompareConfig(study=str(study(tmp_path / "eight", data))))
+    told = people_report(comparison).cautions
+    assert any(missing in text for text in told)
+    assert not any(few in text for text in told)
+    assert any("Below 20, intervals are rough" in text for text in told)
+
+
 def test_participants_are_what_is_resampled():
     many = {f"P{n}": {scene: [float(n)] for scene in range(20)} for n in range(5)}
     trials = [

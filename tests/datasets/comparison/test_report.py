@@ -2,6 +2,8 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,11 +20,15 @@ from handrail.datasets.comparison.figures import (
     trajectory_panels,
     turned,
 )
+from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.comparison.tables import collection_differences_table
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.presentation.drawing import new_figure
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.reading.demonstration import Demonstration
+from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics.contrast import Contrast
 
 LENGTH, DISTANCE = (next(m for m in METRICS if m.name == name) for name in ("length", "smallest_distance"))
@@ -186,3 +192,17 @@ def test_policies_of_unlike_tasks_do_not_come_before_that(ours, unlike, tmp_path
     given = evaluations(tmp_path / "e.json", 4, quick=0.95, slow=0.3)
     outcomes = compare(CompareConfig(tuple(ours), evaluations=(given,))).outcomes
     assert headline(replace(unlike, outcomes=outcomes)) == headline(unlike)
+
+
+@pytest.mark.parametrize("spoilt", [0, 1, 2])
+def test_an_episode_whose_motion_is_not_known_has_no_path(spoilt):
+    features = {"observation.state": Feature("float64", (2,), ("x", "y"))}
+    info = DatasetInfo(Path("one"), 20, "arm", features, 3, 30, "", "", from_handrail=False)
+    ways = [np.outer(np.arange(10.0), [1.0, number]) for number in range(3)]
+    ways[spoilt][4] = np.nan
+    meta = {"length": 10, "tasks": ["go"]}
+    episodes = [Demonstration(n, info, {"observation.state": way}, meta) for n, way in enumerate(ways)]
+    groups = [Group("a", info, tuple(episodes)), Group("none", info, (episodes[spoilt],))]
+    colours = dict.fromkeys(("a", "none"), "red")
+    (panel,) = trajectory_panels(SimpleNamespace(everything=SimpleNamespace(groups=groups), colours=colours))
+    assert len(panel.figure.axes[0].lines) == 2 * 2  # a path, and a dot at its end

@@ -10,6 +10,7 @@ from scipy.stats import fisher_exact
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.episodes import at_equal_length
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.comparison.report import sentence
 from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.proportions import (
     newcombe,
@@ -187,6 +188,17 @@ def test_one_training_seed_says_nothing_of_training():
     assert outcomes.successes["a"].nested is None
 
 
+@pytest.mark.parametrize("shares", [{"a": [0.9], "b": [0.5]}, {"a": [0.9] * 5, "b": [0.5]}])
+def test_one_training_seed_claims_no_difference(shares):
+    """Trainings differ by 10 to 15 points by chance: with one policy nothing tells that apart from data."""
+    (difference,) = judged(**shares).differences
+    assert difference.estimate == pytest.approx(-0.4, abs=0.05)
+    assert not difference.detected
+    assert (difference.p, difference.seen) == (None, None)
+    told = sentence(difference, "Success")
+    assert told.endswith("not tested: one policy of a condition says nothing of other trainings.")
+
+
 GOOD = {"training_seed": 0, "rollouts": [{"seed": 1, "success": True}]}
 WRONG = [
     (None, {"a": [GOOD]}, "expected the format 'handrail.evaluations/1', got None"),
@@ -203,3 +215,44 @@ def test_wrong_evaluations(tmp_path, said, arms, message):
     path.write_text(json.dumps({"format": said, "arms": arms}))
     with pytest.raises(HandrailError, match=message):
         read_evaluations([path])
+
+
+def evaluated(path, seeds, training_seed=0, checkpoint="", **said):
+    """Write an evaluation file of one policy."""
+    policy = {"training_seed": training_seed, "rollouts": [{"seed": seed, "success": True} for seed in seeds]}
+    policy |= {"checkpoint": checkpoint} if checkpoint else {}
+    path.write_text(json.dumps({"format": FORMAT, **said, "arms": {"ee": [policy]}}))
+    return path
+
+
+def test_files_add_up_only_where_they_are_of_the_same(tmp_path):
+    under = {"ee": {"protection": "none", "time_limit": "30"}}
+    one = evaluated(tmp_path / "a", range(5), checkpoint="X", task="reach", conditions=under)
+    plain = evaluated(tmp_path / "b", range(5, 9))  # of a program that says no more
+    (condition,) = read_evaluations([one, plain]).values()
+    assert len(condition.rollouts) == 9
+    mpc = {"ee": {"protection": "mpc", "time_limit": "30"}}
+    for words, others in (
+        ("expected task 'reach' as before, got 'tray'", {"training_seed": 1, "task": "tray"}),
+        ("expected protection 'none' as before, got 'mpc'", {"training_seed": 1, "conditions": mpc}),
+        ("expected checkpoint of draw 0, training seed 0 'X' as before, got 'Y'", {"checkpoint": "Y"}),
+        ("conditions: expected", {"conditions": ["ee"]}),
+    ):
+        other = evaluated(tmp_path / "c", range(5, 9), **others)
+        with pytest.raises(HandrailError, match=words):
+            read_evaluations([one, other])
+
+
+def test_ten_thousand_long_rollouts_can_be_read_again(tmp_path):
+    row = {"success": False, "distances": [0.123] * 120}
+    policy = {"training_seed": 0, "rollouts": [{"seed": seed} | row for seed in range(10_000)]}
+    path = tmp_path / "e.json"
+    path.write_text(json.dumps({"format": FORMAT, "arms": {"ee": [policy]}}, indent=1))
+    (condition,) = read_evaluations([path]).values()
+    assert len(condition.rollouts) == 10_000
+
+
+def test_thousands_of_trials_are_compared_by_a_test_that_takes_no_minutes(monkeypatch):
+    monkeypatch.setattr("scipy.stats.boschloo_exact", pytest.fail)
+    many = unpaired_shares([True] * 900 + [False] * 1100, [True] * 1000 + [False] * 1000)
+    assert many.p == pytest.approx(fisher_exact([[900, 1000], [1100, 1000]]).pvalue)

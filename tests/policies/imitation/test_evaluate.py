@@ -225,3 +225,30 @@ def test_a_file_of_something_else_is_not_added_to(folder, tmp_path):
     file.write_text("{}")
     with pytest.raises(HandrailError, match="expected the format"):
         evaluate(asked, load=load)
+
+
+def test_a_file_put_together_by_hand_is_gone_on_with(folder, tmp_path):
+    file = tmp_path / "e.json"
+    asked = config(folder, "chase", json=str(file), episodes=3, time_limit=0.5)
+    content = evaluate(asked, load=load)
+    (entry,) = content["arms"]["ee intent"]
+    parts = [entry | {"rollouts": entry["rollouts"][:1]}, entry | {"rollouts": entry["rollouts"][1:]}]
+    content["arms"]["ee intent"] = parts
+    file.write_text(json.dumps(content))
+    evaluate(asked, load=pytest.fail)  # nothing is missing
+    more = evaluate(replace(asked, episodes=4), load=load)
+    assert len(read_evaluations([file])["ee intent"].rollouts) == 4
+    assert evaluation_table(more).rows[0][1] == "1"  # policy
+
+
+def test_one_command_at_a_time_writes_a_file(folder, tmp_path):
+    asked = config(folder, "chase", json=str(tmp_path / "e.json"), episodes=1, time_limit=0.5)
+
+    def another(path):
+        with pytest.raises(HandrailError, match="written by another handrail-evaluate"):
+            evaluate(replace(asked, episodes=2), load=load)
+        return load(path)
+
+    assert len(rollouts(evaluate(asked, load=another), "ee intent")) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["e.json"]
+    assert len(rollouts(evaluate(replace(asked, episodes=2), load=load), "ee intent")) == 2
