@@ -91,20 +91,26 @@ def write_whole(path: Path, data: bytes) -> None:
     sync_folder(path.parent)
 
 
-def publish_folder(draft: Path, final: Path) -> None:
-    """Give a finished folder its name, with everything in it on the disk; one of that name is replaced.
+def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
+    """Give a finished folder its name, with everything in it on the disk.
 
-    The old one is renamed first and removed last, so that one of the two is always there whole.
+    One that is replaced is renamed first and removed last, so that one of the two is always there whole.
+
+    Args:
+        draft: The folder.
+        final: Its name.
+        replacing: Whether a folder of that name is replaced; without, it must be missing or empty.
 
     Raises:
-        OSError: The disk does not take it.
+        OSError: The disk does not take it, or somebody else has made a folder of that name meanwhile.
     """
     for path in (draft, *draft.rglob("*")):
         _sync(path, os.O_RDONLY)
     old = beside(final, "old")
-    remove(old)
-    if final.exists():
-        os.replace(final, old)
+    if replacing:
+        remove(old)
+        if final.exists():
+            os.replace(final, old)
     os.replace(draft, final)
     sync_folder(final.parent)
     remove(old)

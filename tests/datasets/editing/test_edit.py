@@ -210,3 +210,35 @@ def test_an_edit_that_was_cut_short_is_finished_and_not_done_twice(tmp_path):
     assert "was cut short, and is finished now" in said
     assert [row["seed"] for row in read_episodes(root)] == [1, 2, 3]
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+MINE = ("notes.txt", "meta/notes.txt", "data/chunk-000/notes.txt", "videos/mine/notes.txt")
+
+
+@pytest.mark.parametrize("mine", MINE)
+def test_an_edit_in_place_keeps_what_others_put_there(recorded, tmp_path, mine):
+    root = copied(tmp_path / "set", record_episodes, cameras=True)
+    (root / mine).parent.mkdir(exist_ok=True)
+    (root / mine).write_text("mine")
+    edit("delete --episodes 0 --in_place", root)
+    assert (root / mine).read_text() == "mine"
+    assert not (root / "data/chunk-000/file-001.parquet").exists()
+    check(root, recorded, [1, 2, 3])
+
+
+def test_an_edit_in_place_removes_no_file_of_no_episode(tmp_path):
+    root = copied(tmp_path / "set", record_episodes, cameras=True)
+    stray = root / "data/chunk-000/mine.parquet"
+    stray.write_bytes(b"mine")
+    assert ".damaged" in edit("delete --episodes 0 --in_place", root, code=2).stderr
+    assert [path.read_bytes() for path in (root / ".damaged").rglob("mine.parquet")] == [b"mine"]
+    assert len(read_episodes(root)) == 4
+
+
+def test_an_output_that_is_a_link_is_refused_before_anything_is_written(tmp_path):
+    root = copied(tmp_path / "set", record_episodes, cameras=True)
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "far")
+    done = edit(f"keep --episodes 0 --output {tmp_path / 'link'}", root, code=2)
+    assert "expected a missing or empty folder" in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["far", "link", "set"]
