@@ -21,6 +21,7 @@ from handrail.datasets.recording.frames import shared_features
 from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.strict_json import known_json
 
 _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
 
@@ -122,7 +123,9 @@ def _with(shared: Mapping[str, Feature], manifest: Manifest) -> Manifest:
 
 def _is_empty(root: Path) -> bool:
     """Return whether a dataset was begun, and nothing has been recorded."""
-    return Layout(root).manifest.is_file() and not row_files(Layout(root))
+    layout = Layout(root)
+    counted = known_json(layout.info).get("total_episodes")  # of one that was copied in part
+    return layout.manifest.is_file() and not (row_files(layout) or counted)
 
 
 def _refused(other: EditSource, first: EditSource) -> str:
