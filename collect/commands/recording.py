@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import CLIENT, Scalar
+from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.folder import is_dataset
 from handrail.datasets.recording.writer import EpisodeWriter
 
@@ -123,12 +125,22 @@ class Recording:
         with Interrupts() as interrupts:
             while writer.num_episodes < wanted:
                 seed = episode_seed(self._config.seed, first + writer.num_episodes, attempt)
+                if seed in self._moved:
+                    attempt += 1
+                    continue
                 outcome = self.episode(seed, interrupts, note)
                 another = outcome.practice or outcome.ended_by is EpisodeEvent.DISCARD
                 attempt = 0 if outcome.kept else attempt + another
                 yield outcome
                 if outcome.ended_by is EpisodeEvent.QUIT:
                     return
+
+    @cached_property
+    def _moved(self) -> set[Any]:
+        """Seeds of the dataset's episodes that an edit gave other numbers: none is recorded again."""
+        root, seed = self._config.dataset.folder, self._config.seed
+        rows = read_episodes(root) if is_dataset(Layout(root)) else []
+        return {row.get("seed") for n, row in enumerate(rows) if row.get("seed") != episode_seed(seed, n)}
 
 
 def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:

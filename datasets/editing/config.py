@@ -86,12 +86,6 @@ class SplitConfig(EditConfig):
     parts: Words = ()
     """NAME=SHARE, such as train=0.8 test=0.2; or NAME=EPISODES, such as test=3,5-7."""
 
-    def check(self) -> None:
-        """Check what can be checked without reading anything."""
-        if self.in_place:
-            raise HandrailError("--in_place: expected --output with split")
-        super().check()
-
 
 @dataclass(frozen=True, kw_only=True)
 class TrimConfig(EditConfig):

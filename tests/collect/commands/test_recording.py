@@ -1,8 +1,10 @@
 """Laws of a cockpit's folder, said or not: a dataset that fits goes on, another one is left alone."""
 
+import shutil
 from dataclasses import replace
 
 import pytest
+from command_helpers import ran
 
 from handrail.collect.commands.account import next_commands
 from handrail.collect.commands.record import record
@@ -10,6 +12,7 @@ from handrail.collect.commands.recording import located, open_writer, session_wr
 from handrail.collect.config import DatasetConfig, DriveConfig, FoundDatasetConfig, RecordConfig
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.reading.reader import read_episodes
 
 PLAIN = DriveConfig(physics=False)
 ENV = build_env(PLAIN, PLAIN.dataset.fps)
@@ -49,6 +52,23 @@ def test_one_of_another_rate_or_robot_or_no_dataset_is_left_alone(tmp_path):
     assert opened(replace(PLAIN, robot="ridgeback_panda"))[0].name == "reach-4"
     assert opened(faster)[0].name == "reach-2"
     assert {path: path.read_bytes() for path in first.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_no_episode_is_recorded_again_after_an_edit(tmp_path, workers):
+    """Whether at once or in two goes: an edit gives episodes other numbers, on which their seeds depend."""
+    flags = ("--task", "reach", "--time_limit", "0.2", "--no_physics", "--dataset.num_episodes")
+    ran(tmp_path / "d", *flags, 7)
+    ran(tmp_path / "d", "--episodes", "1,3,4", "--in_place", name="delete")
+    shutil.copytree(tmp_path / "d", tmp_path / "at_once")
+    before = [row["seed"] for row in read_episodes(tmp_path / "d")]
+    ran(tmp_path / "at_once", *flags, 6, "--resume", "--workers", workers)
+    for episodes in (2, 4):
+        ran(tmp_path / "d", *flags, episodes, "--resume")
+    seeds = [row["seed"] for row in read_episodes(tmp_path / "d")]
+    assert seeds == [row["seed"] for row in read_episodes(tmp_path / "at_once")]
+    assert seeds[:4] == before
+    assert len(set(seeds)) == 10
 
 
 def test_a_folder_that_is_said_goes_on_and_is_never_another(tmp_path):

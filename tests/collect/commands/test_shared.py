@@ -170,6 +170,15 @@ def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
     shutil.rmtree(shards)
 
 
+def test_what_is_left_of_shards_that_were_being_removed_is_no_part_of_the_next_recording(alone, tmp_path):
+    root, shards = tmp_path / "d", tmp_path / ".d.shards"
+    record(tmp_path / "other", "--seed", "4", episodes=5)
+    shards.mkdir()
+    (tmp_path / "other").rename(shards / "shard-0000000")  # killed after their plan was removed
+    record(root, "--workers", "2")
+    assert content(root) == alone
+
+
 @pytest.mark.parametrize(
     ("episodes", "settings", "expected"),
     [
