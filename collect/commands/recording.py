@@ -16,7 +16,7 @@ from handrail.collect.session.build import build_env, build_modes, build_session
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import COLUMN as SETTINGS
 from handrail.collect.session.recorded import settings_json
-from handrail.collect.session.recorder import Recorder
+from handrail.collect.session.recorder import OUTCOME, Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
@@ -70,7 +70,12 @@ class Recording:
         self._session = build_session(config, env, self._observers, config.dataset.fps, person, share)
 
     def into(self, writer: EpisodeWriter) -> None:
-        """Save the episodes to come in a dataset."""
+        """Save the episodes to come in a dataset; one whose episodes lack a column of theirs is refused."""
+        if new := [name for name in (*self.columns, *OUTCOME) if not writer.has_column(name)]:
+            raise HandrailError(
+                f"--resume: cannot add to {str(writer.root)!r}: its episodes have no {new[0]!r}; record into"
+                " another folder, and put both together with handrail-edit merge"
+            )
         self._recorder.writer = writer
 
     def warm_up(self, seed: int) -> None:

@@ -6,6 +6,7 @@ with any number of workers.
 """
 
 import json
+import os
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -64,7 +65,7 @@ class Shards:
 
     def __init__(self, config: RecordConfig) -> None:
         self._config = config
-        self.root = config.dataset.folder.absolute()
+        self.root = Path(os.path.realpath(config.dataset.folder))
         self.folder = beside(self.root, "shards")
         self._file = self.folder / "plan.json"
 

@@ -93,7 +93,7 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
                 f" (handrail-inspect {target}) before the next"
             )
         if target not in roots:
-            if target.is_symlink() or (target.exists() and (not target.is_dir() or any(target.iterdir()))):
+            if target.exists() and (not target.is_dir() or any(target.iterdir())):
                 raise HandrailError(
                     f"--output {target}: expected a missing or empty folder, found one in use"
                 )

@@ -57,9 +57,7 @@ class Survey:
     @property
     def damage(self) -> tuple[str, ...]:
         """What is wrong, one text an episode."""
-        faults = [
-            (group.first + place, each) for group in self.groups for place, each in enumerate(group.faults)
-        ]
+        faults = [each for group in self.groups for each in enumerate(group.faults, group.first)]
         return tuple(f"episode {number}: {fault}" for number, fault in faults if fault)
 
     @property

@@ -94,7 +94,7 @@ class EpisodeWriter:
             overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
             types: Of the extra columns; the first episode fixes them without.
         """
-        layout = Layout(Path(root).expanduser().absolute())
+        layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
         manifest.check()
         with explained(f"cannot create dataset {str(layout.root)!r}"), contextlib.ExitStack() as on_error:
             settle(layout.root)
@@ -117,7 +117,7 @@ class EpisodeWriter:
                 session and are kept with each of its episodes.
             verify: Read every file anew, also those that have not changed since they were last checked.
         """
-        layout = Layout(Path(root).expanduser().absolute())
+        layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
         words = f"--resume: cannot add to dataset {str(layout.root)!r}"
         with explained(words), contextlib.ExitStack() as on_error:
             settle(layout.root)

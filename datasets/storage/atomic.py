@@ -46,14 +46,18 @@ def write_synced(path: Path, data: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def sync_file(path: Path) -> None:
-    """Wait until the disk has a file that something else has written."""
-    _sync(path, os.O_RDONLY)
+def sync_file(path: Path, flags: int = os.O_RDONLY) -> None:
+    """Wait until the disk has a file that something else has written, or a folder, opened with some flags."""
+    descriptor = os.open(path, flags | os.O_NONBLOCK)  # a named pipe would wait
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def sync_folder(path: Path) -> None:
     """Wait until the disk has the names in a folder."""
-    _sync(path, os.O_RDONLY | os.O_DIRECTORY)
+    sync_file(path, os.O_RDONLY | os.O_DIRECTORY)
 
 
 def make_folder(path: Path) -> None:
@@ -105,7 +109,7 @@ def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
         OSError: The disk does not take it, or somebody else has made a folder of that name meanwhile.
     """
     for path in (draft, *draft.rglob("*")):
-        _sync(path, os.O_RDONLY)
+        sync_file(path)
     old = beside(final, "old")
     if replacing:
         remove(old)
@@ -129,11 +133,3 @@ def remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
-
-
-def _sync(path: Path, flags: int) -> None:
-    descriptor = os.open(path, flags | os.O_NONBLOCK)  # a named pipe would wait
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
