@@ -13,7 +13,7 @@ from pathlib import Path
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.info_file import Encodings, summary_files
-from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
+from handrail.datasets.format.layout import FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import ColumnTypes, Totals
 from handrail.datasets.recording.file_group import write_file_groups
@@ -22,7 +22,7 @@ from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
 
-_OURS = (*FOLDERS, STAGING, DAMAGED)
+_OURS = (*FOLDERS, STAGING)
 
 
 def write_anew(
@@ -42,7 +42,8 @@ def write_anew(
         slices: Its episodes, in order.
         types: Of its extra columns.
         encodings: How its videos are encoded, where that is not as Handrail does it.
-        in_place: Whether the slices are of the dataset that is replaced: what lies beside its files stays.
+        in_place: Whether the slices are of the dataset that is replaced: what lies beside its files stays,
+            its quarantine too.
         damaged: Files of the dataset that is replaced, for its quarantine; then no episode need be left.
 
     Raises:
@@ -67,8 +68,6 @@ def write_anew(
                     _second_name(root / name, draft.root / name)
         if damaged is not None:
             old = Layout(root)
-            if old.damaged.is_dir():
-                _copy_folder(old.damaged, draft.damaged)
             target = next_damaged(draft)
             for path in damaged:
                 _second_name(path, target / old.relative(path))
