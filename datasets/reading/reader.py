@@ -114,7 +114,7 @@ def read_episodes(root: str | Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for path in row_files(Layout(info.root)):
         try:
-            with pq.ParquetFile(regular(path)) as file:
+            with pq.ParquetFile(regular(path), page_checksum_verification=True) as file:
                 found = table_rows(file.read(columns=plain_names(file), use_threads=False))
             for row in found:
                 row["tasks"] = msgspec.convert(row, EpisodeRow).tasks or []

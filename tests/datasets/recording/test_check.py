@@ -11,15 +11,16 @@ import pytest
 from canned import copied
 from command_helpers import command, ran, refused
 from compare_helpers import JOINTS, lerobot_dataset, quick_and_slow
-from datasets_helpers import record, record_one, resume, tree
+from datasets_helpers import TINY_FEATURES, record, record_one, resume, tree
 from editing_helpers import content
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.merge import merge_datasets
+from handrail.datasets.format.episode_rows import EpisodeRows
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.metadata import Checksum
 from handrail.datasets.reading.check import check_report, check_whole
-from handrail.datasets.reading.reader import read_frames
+from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording import checksums
 from handrail.datasets.recording.repair import repair
 from handrail.policies.imitation.config import StoredConfig, TrainConfig
@@ -171,3 +172,26 @@ def test_a_value_that_is_not_there_is_no_number(tmp_path, name):
     pq.write_table(table.set_column(place, name, gap), path)
     with pytest.raises(HandrailError, match=r"\A[^\n]*1 rows without a value where (int64|bool)[^\n]*\Z"):
         read_frames(root, 0)
+
+
+def test_no_bit_of_a_line_of_metadata_is_taken_for_another(tmp_path):
+    root = record(tmp_path / "set", 3, features=TINY_FEATURES)
+    merge_datasets([root], root)
+    path, wanted = Layout(root).row(0), read_episodes(root)
+    whole = path.read_bytes()
+    pages = len(whole) - 8 - pq.read_metadata(path).serialized_size
+    for place in range(4, pages, 29):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        for read in (lambda: read_episodes(root), lambda: list(EpisodeRows.read(path).rows)):
+            try:
+                assert read() == wanted
+            except (HandrailError, OSError, ValueError):
+                continue
+
+
+@pytest.mark.parametrize("of", ["meta/tasks.parquet", "meta/episodes/chunk-000/file-000.parquet"])
+def test_another_file_under_the_name_of_one_of_rows_is_one_line(root, of):
+    shutil.copyfile(root / of, Layout(root).data(0))
+    with pytest.raises(HandrailError, match=r"\A[^\n]*\Z"):
+        read_frames(root, 0)
+    assert "episode 0: data/" in check_report(root)[0]
