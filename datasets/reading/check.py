@@ -100,5 +100,5 @@ def _unreadable(info: DatasetInfo) -> Iterator[str]:
                 dataset.frames(episode)
                 with suppress(FileNotFoundError):  # `_missing` names it
                     digest_of_pictures(dataset.info, [dataset.row(episode)])
-            except HandrailError as error:
+            except (HandrailError, TypeError) as error:  # a place in a video that is no number
                 yield f"episode {episode}: {error}"

@@ -161,6 +161,17 @@ def test_a_packed_dataset_that_was_copied_over_its_single_files_is_read_as_packe
     assert len([path for path in (single / ".damaged").rglob("*") if path.is_file()]) == 6
 
 
+@pytest.mark.parametrize("said", [None, "x"])
+def test_a_place_in_a_video_that_is_no_number_is_one_line(tmp_path, said):
+    root = lerobot_dataset(tmp_path / "set", JOINTS, 30, 0.0, camera=True)
+    path = next(root.glob("meta/episodes/*/*"))
+    table = pq.read_table(path)
+    name = next(name for name in table.column_names if name.endswith("from_timestamp"))
+    place = table.schema.get_field_index(name)
+    pq.write_table(table.set_column(place, name, pa.array([said] * len(table))), path)
+    assert "episode 0: " in check_report(root)[0]
+
+
 @pytest.mark.parametrize("name", ["safety.contacts", "engaged"])
 def test_a_value_that_is_not_there_is_no_number(tmp_path, name):
     root = record(tmp_path / "set", 1)
