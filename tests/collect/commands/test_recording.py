@@ -56,7 +56,7 @@ def test_one_of_another_rate_or_robot_or_no_dataset_is_left_alone(tmp_path):
 
 
 def test_no_episode_is_recorded_again_after_an_edit(tmp_path):
-    """Whether at once, in two goes, or by a worker: an edit gives episodes other numbers, and seeds follow."""
+    """At once, in two goes, or by a worker: an edit gives episodes other numbers, and seeds follow."""
     flags = ("--task", "reach", "--time_limit", "0.2", "--no_physics", "--dataset.num_episodes")
     root, once, part = tmp_path / "d", tmp_path / "at_once", tmp_path / "part"
     ran(root, *flags, 7)
