@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from handrail.collect.session.build import build_env, build_modes, build_session
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import COLUMN as SETTINGS
 from handrail.collect.session.recorded import settings_json
-from handrail.collect.session.recorder import Recorder
+from handrail.collect.session.recorder import OUTCOME, Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
@@ -24,6 +25,7 @@ from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import CLIENT, Scalar
+from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.folder import is_dataset
 from handrail.datasets.recording.writer import EpisodeWriter
 
@@ -68,7 +70,12 @@ class Recording:
         self._session = build_session(config, env, self._observers, config.dataset.fps, person, share)
 
     def into(self, writer: EpisodeWriter) -> None:
-        """Save the episodes to come in a dataset."""
+        """Save the episodes to come in a dataset; one whose episodes lack a column of theirs is refused."""
+        if new := [name for name in (*self.columns, *OUTCOME) if not writer.has_column(name)]:
+            raise HandrailError(
+                f"--resume: cannot add to {str(writer.root)!r}: its episodes have no {new[0]!r}; record into"
+                " another folder, and put both together with handrail-edit merge"
+            )
         self._recorder.writer = writer
 
     def warm_up(self, seed: int) -> None:
@@ -123,12 +130,22 @@ class Recording:
         with Interrupts() as interrupts:
             while writer.num_episodes < wanted:
                 seed = episode_seed(self._config.seed, first + writer.num_episodes, attempt)
+                if seed in self._moved:
+                    attempt += 1
+                    continue
                 outcome = self.episode(seed, interrupts, note)
                 another = outcome.practice or outcome.ended_by is EpisodeEvent.DISCARD
                 attempt = 0 if outcome.kept else attempt + another
                 yield outcome
                 if outcome.ended_by is EpisodeEvent.QUIT:
                     return
+
+    @cached_property
+    def _moved(self) -> set[Any]:
+        """Seeds of the dataset's episodes that an edit gave other numbers: none is recorded again."""
+        root, seed = self._config.dataset.folder, self._config.seed
+        rows = read_episodes(root) if is_dataset(Layout(root)) else []
+        return {row.get("seed") for n, row in enumerate(rows) if row.get("seed") != episode_seed(seed, n)}
 
 
 def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:

@@ -6,6 +6,7 @@ with any number of workers.
 """
 
 import json
+import os
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -35,9 +36,9 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.writer import EpisodeWriter
-from handrail.datasets.storage.atomic import beside, explained, remove, write_whole
+from handrail.datasets.storage.atomic import beside, explained, remove
 from handrail.datasets.storage.lock import HeldError
-from handrail.datasets.storage.strict_json import load_json
+from handrail.datasets.storage.strict_json import load_json, write_json
 
 _FORMAT = "handrail.shards/1"
 _FEW = 5  # episodes of a shard at least
@@ -64,7 +65,7 @@ class Shards:
 
     def __init__(self, config: RecordConfig) -> None:
         self._config = config
-        self.root = config.dataset.folder.absolute()
+        self.root = Path(os.path.realpath(config.dataset.folder))
         self.folder = beside(self.root, "shards")
         self._file = self.folder / "plan.json"
 
@@ -90,8 +91,8 @@ class Shards:
     def begin(self, first: int) -> None:
         """Take note of what is to be recorded, beside a dataset that has so many episodes already."""
         with explained(f"cannot record beside dataset {str(self.root)!r}"):
-            content = {"format": _FORMAT, "first": first, "settings": self._settings}
-            write_whole(self._file, (json.dumps(content, indent=1) + "\n").encode())
+            remove(self.folder)  # without a plan it is of another recording, and was being removed
+            write_json(self._file, {"format": _FORMAT, "first": first, "settings": self._settings})
 
     def jobs(self, episodes: int) -> list[Job]:
         """Return what records the shards, for a dataset with so many episodes; none if it has them all."""
@@ -149,7 +150,7 @@ class Shards:
         )
 
     def _merge(self, jobs: Sequence[Job]) -> None:
-        roots = [self.root] * bool(self._plan.first) + [_folder(jobs[0])]
+        roots = [self.root] * bool(self._plan.first) + [jobs[0].arguments[1]]
         sources = [EditSource.open(root) for root in roots]
         before = sources[0].slices() if self._plan.first else ()
         new = chain.from_iterable(_slices(job, sources[0].manifest) for job in jobs)
@@ -159,13 +160,9 @@ class Shards:
             raise HandrailError(f"{str(self.folder)!r} cannot be read: {message_of(error)}") from error
 
 
-def _folder(job: Job) -> Path:
-    return job.arguments[1]
-
-
 def _slices(job: Job, manifest: Manifest) -> Iterator[EpisodeSlice]:
     """Yield the episodes of a shard."""
-    layout = Layout(_folder(job))
+    layout = Layout(job.arguments[1])
     records = list(each_record(layout, with_stats=True))
     if len(records) != job.size:
         raise HandrailError(

@@ -13,7 +13,7 @@ from handrail.datasets.recording.frames import Frame, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter, Scalar
 from handrail.datasets.storage.atomic import explained
 
-_COLUMNS = (
+OUTCOME = (
     *("success", "failure_reason", "seed", "started", "wall_time", "brakes", "late", "undos"),
     *("contact_onsets", "contact_periods"),
 )
@@ -110,4 +110,4 @@ class Recorder:
         row: dict[str, Scalar] = dict(self._columns)
         if self.writer.has_column("operator_says"):  # datasets of old have no such column
             row["operator_says"] = outcome.operator_says
-        self.writer.save_episode(row | {name: getattr(outcome, name) for name in _COLUMNS})
+        self.writer.save_episode(row | {name: getattr(outcome, name) for name in OUTCOME})

@@ -86,12 +86,6 @@ class SplitConfig(EditConfig):
     parts: Words = ()
     """NAME=SHARE, such as train=0.8 test=0.2; or NAME=EPISODES, such as test=3,5-7."""
 
-    def check(self) -> None:
-        """Check what can be checked without reading anything."""
-        if self.in_place:
-            raise HandrailError("--in_place: expected --output with split")
-        super().check()
-
 
 @dataclass(frozen=True, kw_only=True)
 class TrimConfig(EditConfig):
@@ -196,8 +190,7 @@ class MergeConfig:
         if not self.output:
             raise HandrailError("merge: expected --output FOLDER for the new dataset, got none")
         target = _apart(self.output, *self.roots)
-        replaces = any(os.path.realpath(target) == os.path.realpath(root) for root in self.roots)
-        if self.in_place != replaces:
+        if self.in_place != (target in self.roots):
             which = "one of the folders" if self.in_place else "another folder, or --in_place to replace it"
             raise HandrailError(f"--output {self.output}: expected {which}")
         return target
@@ -215,7 +208,7 @@ def packing_advice(root: Path) -> str:
 
 
 def _absolute(folder: str) -> Path:
-    return Path(folder).expanduser().absolute()
+    return Path(os.path.realpath(Path(folder).expanduser()))  # a link stays, what it leads to is edited
 
 
 def _apart(output: str, *roots: Path) -> Path:

@@ -68,10 +68,8 @@ def _slices(config: EditConfig, source: EditSource) -> Iterator[EpisodeSlice]:
     """Return what a dataset's episodes become."""
     words, everything = getattr(config, "episodes", ()), range(len(source.rows))
     chosen = set(_chosen("--episodes", words, source.successes))
-    if isinstance(config, DeleteConfig):
-        return source.slices(set(everything) - chosen)
-    if isinstance(config, KeepConfig):
-        return source.slices(chosen)
+    if isinstance(config, DeleteConfig | KeepConfig):
+        return source.slices(chosen if isinstance(config, KeepConfig) else set(everything) - chosen)
     if isinstance(config, RenameConfig) and config.old_task:
         tasks = {task for row in source.rows for task in row["tasks"]}
         if config.old_task not in tasks:

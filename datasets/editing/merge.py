@@ -21,6 +21,7 @@ from handrail.datasets.recording.frames import shared_features
 from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.strict_json import known_json
 
 _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
 
@@ -83,10 +84,8 @@ def merge_datasets(
         name: Of the new dataset, `owner/name`; that of the first folder when empty.
         verify: Read every file of the datasets anew, also those that have not changed since the last check.
     """
-    target = Path(output).expanduser().absolute()
-    given = [Path(root).expanduser().absolute() for root in roots]
-    real = [os.path.realpath(root) for root in given]
-    if twice := [str(root) for root, place in zip(given, real, strict=True) if real.count(place) > 1]:
+    target, *given = (Path(os.path.realpath(Path(root).expanduser())) for root in (output, *roots))
+    if twice := [str(root) for root in given if given.count(root) > 1]:
         raise HandrailError(f"merge: expected each folder once, got {twice[0]!r} twice")
     places = [root for root in given if root == target or not _is_empty(root)] or given
     with opened(places, target, verify) as sources:
@@ -100,7 +99,7 @@ def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]
         root: Its folder; removed too if no episode is left.
         dropped: Says by an episode's row of metadata whether it goes.
     """
-    root = Path(root).expanduser().absolute()
+    root = Path(os.path.realpath(Path(root).expanduser()))  # a link alone would leave what it leads to
     with explained(f"cannot write {str(root)!r}"):
         settle(root)  # what was cut short is done; dropping the same again does no harm
         if _is_empty(root):
@@ -122,7 +121,9 @@ def _with(shared: Mapping[str, Feature], manifest: Manifest) -> Manifest:
 
 def _is_empty(root: Path) -> bool:
     """Return whether a dataset was begun, and nothing has been recorded."""
-    return Layout(root).manifest.is_file() and not row_files(Layout(root))
+    layout = Layout(root)
+    counted = known_json(layout.info).get("total_episodes")  # of one that was copied in part
+    return layout.manifest.is_file() and not (row_files(layout) or counted)
 
 
 def _refused(other: EditSource, first: EditSource) -> str:

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
+from itertools import groupby
 from pathlib import Path
 
 import fsspec
@@ -185,13 +186,9 @@ def _check_nobody(root: Path) -> None:
 
 def _few(numbers: Sequence[int]) -> str:
     """Return numbers as a command line takes them, runs as ranges."""
-    runs: list[list[int]] = []
-    for each in numbers:
-        if runs and each == runs[-1][1] + 1:
-            runs[-1][1] = each
-        else:
-            runs.append([each, each])
-    return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in runs)
+    groups = groupby(enumerate(numbers), lambda each: each[1] - each[0])  # the same in a run
+    runs = [[number for _, number in run] for _, run in groups]
+    return ",".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
 
 
 def _write_card(root: Path, repo_id: str, license_id: str) -> str:

@@ -87,6 +87,11 @@ class EditSource:
 def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterator[list[EditSource]]:
     """Provide datasets whose episodes go to a target, which nobody else writes if it is one of them."""
     with explained(f"cannot write {str(target)!r}"):
+        if settle(target):
+            raise HandrailError(
+                f"dataset {str(target)!r}: an edit was cut short, and is finished now; look at it"
+                f" (handrail-inspect {target}) before the next"
+            )
         if target not in roots:
             if target.exists() and (not target.is_dir() or any(target.iterdir())):
                 raise HandrailError(
@@ -94,17 +99,12 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
                 )
             yield [EditSource.open(root, verify) for root in roots]
             return
-        if settle(target):
-            raise HandrailError(
-                f"dataset {str(target)!r}: an edit was cut short, and is finished now; look at it"
-                f" (handrail-inspect {target}) before the next"
-            )
         own = EditSource.open(target)
-        if own.layout.damaged.exists():
-            raise HandrailError(
-                f"dataset {str(target)!r}: in {own.layout.damaged.name} are episodes that were set aside;"
-                " some may have to go too: remove that folder"
-            )
         with DatasetLock(own.layout.staging):
             tidy_locked(own.layout, own.manifest, Checksums(target, anew=verify))
+            if own.layout.damaged.exists():
+                raise HandrailError(
+                    f"dataset {str(target)!r}: in {own.layout.damaged.name} are episodes that were set aside,"
+                    " or files of none; some may have to go too: remove that folder"
+                )
             yield [own if root == target else EditSource.open(root, verify) for root in roots]

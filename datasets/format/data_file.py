@@ -127,7 +127,7 @@ def _episode_spans(metadata: pq.FileMetaData) -> list[tuple[float, float]]:
     spans = list[tuple[float, float]]()
     for group in map(metadata.row_group, range(metadata.num_row_groups)):
         columns = map(group.column, range(group.num_columns))
-        span = next(each for each in columns if each.path_in_schema == _EPISODE).statistics
+        span = next((each.statistics for each in columns if each.path_in_schema == _EPISODE), None)
         spans.append((span.min, span.max) if span and span.has_min_max else (-math.inf, math.inf))
     return spans
 

@@ -91,7 +91,7 @@ class EpisodeRows:
             ForeignRowError: The file is whole, but another tool wrote it.
             OSError, pyarrow.ArrowException, ValueError, KeyError: The file is not whole, or has no row.
         """
-        with pq.ParquetFile(regular(path)) as file:
+        with pq.ParquetFile(regular(path), page_checksum_verification=True) as file:
             marks = file.schema_arrow.metadata or {}
             if _FILES not in marks:
                 raise ForeignRowError(
@@ -258,7 +258,7 @@ def with_checksums(path: Path, files: Mapping[str, Checksum]) -> bytes:
 
 
 def _read(path: Path) -> pa.Table:
-    with pq.ParquetFile(regular(path)) as file:
+    with pq.ParquetFile(regular(path), page_checksum_verification=True) as file:
         return file.read(use_threads=False)
 
 

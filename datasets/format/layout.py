@@ -48,6 +48,7 @@ class Layout:
         self.info = meta / "info.json"  # the file that LeRobot opens first
         self.stats = meta / "stats.json"  # the statistics over all episodes
         self.tasks = meta / "tasks.parquet"  # the task sentences
+        self.preview = meta / "preview.webp"  # a moving picture for the card
         self.episodes = meta / "episodes"  # the episode rows
         self.manifest = meta / "handrail.json"  # what Handrail keeps of the schema; written once, first
         self.staging = root / STAGING  # files under temporary names, and the lock

@@ -73,7 +73,7 @@ def sought(container: Any, first: int, fps: int) -> Any:
     if stream.codec_context is None:
         raise ValueError("an unknown codec")
     if first:
-        container.seek(round(Fraction(first, fps) / (stream.time_base or 1)), stream=stream)
+        container.seek(round(first / Fraction(fps) / (stream.time_base or 1)), stream=stream)
     return stream
 
 

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
@@ -10,6 +11,7 @@ from handrail.datasets.format.episode_rows import ForeignRowError
 from handrail.datasets.format.layout import FOLDERS, Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.schema import video_keys
+from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo, open_dataset, read_episodes, read_info
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.survey import Survey, shortened, survey
@@ -44,13 +46,17 @@ def check_report(root: str | Path) -> list[str]:
         other = f"other content than was saved, but the right frames; {advice}"
         unknown = [f"{found.layout.relative(path)}: no file of a LeRobot dataset" for path in found.unknown]
         faults = [*found.damage, *(f"{name}: {other}" for name in found.rewritten), *unknown]
-    stats = Layout(info.root).stats
+        totals, said = found.totals, "meta/info.json: does not count the episodes that are there"
+        if not found.damage and (info.episodes, info.frames) != (totals.episodes, totals.frames):
+            faults.append(f"{said}; handrail-edit repair {info.root} writes it anew")
+    layout = Layout(info.root)
+    summary = (layout.stats, layout.tasks) if info.episodes else ()
+    faults += [f"{path.name}: missing" for path in summary if not path.exists()]
     try:
-        read_json(stats)
-    except FileNotFoundError:
-        faults += [f"{stats.name}: missing"] if info.episodes else []
+        if layout.stats.exists():
+            read_json(layout.stats)
     except (OSError, ValueError) as error:
-        faults.append(f"meta/{stats.name}: {error}")
+        faults.append(f"meta/{layout.stats.name}: {error}")
     return faults
 
 
@@ -87,10 +93,12 @@ def _missing(info: DatasetInfo) -> list[str]:
 
 
 def _unreadable(info: DatasetInfo) -> Iterator[str]:
-    """Yield which episodes of a dataset without checksums cannot be read."""
+    """Yield which episodes of a dataset without checksums cannot be read, or lack pictures."""
     with open_dataset(info.root) as dataset:
         for episode in range(len(dataset.rows)):
             try:
                 dataset.frames(episode)
-            except HandrailError as error:
+                with suppress(FileNotFoundError):  # `_missing` names it
+                    digest_of_pictures(dataset.info, [dataset.row(episode)])
+            except (HandrailError, TypeError) as error:  # a place in a video that is no number
                 yield f"episode {episode}: {error}"

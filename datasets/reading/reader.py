@@ -24,6 +24,7 @@ from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.schema import NUMBERS, Feature, features_of
 from handrail.datasets.format.tables import flat_numbers
 from handrail.datasets.reading.simulated import STATE, SUCCESS, kept_in_state, out_of_state
+from handrail.datasets.storage.atomic import beside
 from handrail.datasets.storage.strict_json import read_json
 
 _DAMAGED = " the dataset is damaged"
@@ -66,7 +67,8 @@ def read_info(root: str | Path) -> DatasetInfo:
     layout = Layout(Path(root).expanduser().absolute())
     where = str(layout.root)
     if not layout.root.is_dir():
-        raise HandrailError(f"dataset {where!r}: expected a folder, found none; check the path")
+        repair = f", or handrail-edit repair {where}" if beside(layout.root, "old").is_dir() else ""
+        raise HandrailError(f"dataset {where!r}: expected a folder, found none; check the path{repair}")
     if not layout.info.is_file() and not layout.manifest.is_file():
         raise HandrailError(f"{where!r} is not a LeRobot dataset (no meta/info.json); check the path")
     try:
@@ -112,7 +114,7 @@ def read_episodes(root: str | Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for path in row_files(Layout(info.root)):
         try:
-            with pq.ParquetFile(regular(path)) as file:
+            with pq.ParquetFile(regular(path), page_checksum_verification=True) as file:
                 found = table_rows(file.read(columns=plain_names(file), use_threads=False))
             for row in found:
                 row["tasks"] = msgspec.convert(row, EpisodeRow).tasks or []
@@ -232,6 +234,8 @@ def with_success(info: DatasetInfo, rows: Sequence[dict[str, Any]]) -> list[dict
 def _values(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
     if feature.dtype == "string":
         return np.array([value or "" for value in column.to_pylist()], dtype=str)
+    if column.null_count and feature.number.kind != "f":
+        raise ValueError(f"{column.null_count} rows without a value where {feature.dtype} is expected")
     shape = () if feature.is_scalar else feature.shape
     return flat_numbers(column).astype(feature.dtype).reshape(len(column), *shape)
 

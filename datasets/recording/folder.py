@@ -14,7 +14,7 @@ from handrail.datasets.storage.lock import LOCK_NAME
 _NUMBERED = r"chunk-(\d{3}|[1-9]\d{3,})/file-\d{3}"
 _OURS = re.compile(
     rf"(\.damaged/[^/]+/)?((data|meta/episodes)/{_NUMBERED}\.parquet|videos/[^/]+/{_NUMBERED}\.mp4)"
-    r"|meta/(info\.json|stats\.json|tasks\.parquet|handrail\.json)"
+    r"|meta/(info\.json|stats\.json|tasks\.parquet|handrail\.json|preview\.webp)"
 )
 _GIVEN_UP = "episodes"  # the episode rows of a dataset that is being cleared, in the staging folder
 
@@ -54,7 +54,7 @@ def check_target(layout: Layout, overwrite: bool) -> None:
             " choose another root"
         )
     check_folders(layout)
-    if foreign := _foreign(layout):
+    if foreign := foreign_files(layout):
         raise HandrailError(
             f"dataset {str(root)!r}: found what Handrail did not write, {shortened(foreign, ', ')};"
             " --overwrite removes only its own files: move this away, or choose another root"
@@ -105,7 +105,8 @@ def finish_clearing(layout: Layout) -> None:
 def _clear_given_up(layout: Layout) -> None:
     """Remove the files of a dataset whose episode rows are in the staging folder; these go last."""
     folders = [layout.root / name for name in ("data", "videos", DAMAGED)]
-    for path in (*folders, layout.tasks, layout.stats, layout.info, layout.staging / _GIVEN_UP):
+    meta = layout.tasks, layout.stats, layout.preview, layout.info
+    for path in (*folders, *meta, layout.staging / _GIVEN_UP):
         remove(path)
 
 
@@ -137,7 +138,7 @@ def next_damaged(layout: Layout) -> Path:
     return layout.damaged / f"{max(there, default=-1) + 1:03d}"
 
 
-def _foreign(layout: Layout) -> list[str]:
+def foreign_files(layout: Layout) -> list[str]:
     """Return what lies among a dataset's files, or among those in quarantine, and is none of them."""
     tops = [layout.root / name for name in (*FOLDERS, DAMAGED)]
     found = [path for top in tops for path in (top, *top.rglob("*")) if path.is_symlink() or path.is_file()]

@@ -8,6 +8,7 @@ rebuilt if they are not, to the byte, what the episodes say.
     handrail-edit repair path/to/dataset
 """
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -71,7 +72,7 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
         root: The dataset's folder.
         set_aside_damaged: Whether episodes that are not whole go to the quarantine; without, they are named.
     """
-    layout = Layout(Path(root).expanduser().absolute())
+    layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
         settle(layout.root)
         manifest = read_manifest(layout)

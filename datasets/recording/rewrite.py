@@ -13,16 +13,16 @@ from pathlib import Path
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.info_file import Encodings, summary_files
-from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
+from handrail.datasets.format.layout import FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import ColumnTypes, Totals
 from handrail.datasets.recording.file_group import write_file_groups
-from handrail.datasets.recording.folder import clear_staging, next_damaged
+from handrail.datasets.recording.folder import clear_staging, foreign_files, next_damaged
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
 
-_OURS = (*FOLDERS, STAGING, DAMAGED)
+_OURS = (*FOLDERS, STAGING)
 
 
 def write_anew(
@@ -42,7 +42,8 @@ def write_anew(
         slices: Its episodes, in order.
         types: Of its extra columns.
         encodings: How its videos are encoded, where that is not as Handrail does it.
-        in_place: Whether the slices are of the dataset that is replaced: what lies beside its files stays.
+        in_place: Whether the slices are of the dataset that is replaced: what lies beside its files stays,
+            its quarantine too.
         damaged: Files of the dataset that is replaced, for its quarantine; then no episode need be left.
 
     Raises:
@@ -50,7 +51,7 @@ def write_anew(
             been changed then.
         OSError: The disk does not take it.
     """
-    with drafted(root) as draft:
+    with drafted(root, in_place) as draft:
         totals = write_file_groups(draft, manifest, slices, types)
         if not totals.episodes and damaged is None:
             raise HandrailError(
@@ -62,36 +63,42 @@ def write_anew(
                 replace(path, data, draft.staging)
         if in_place:
             _copy_folder(root, draft.root, _OURS)
+            for name in foreign_files(Layout(root)):
+                if not (root / name).is_symlink():  # it may stand for a file of the old dataset
+                    _second_name(root / name, draft.root / name)
         if damaged is not None:
             old = Layout(root)
-            if old.damaged.is_dir():
-                _copy_folder(old.damaged, draft.damaged)
             target = next_damaged(draft)
             for path in damaged:
-                make_folder((target / old.relative(path)).parent)
                 _second_name(path, target / old.relative(path))
     return totals
 
 
 @contextmanager
-def drafted(root: Path) -> Iterator[Layout]:
-    """Provide an empty folder that takes the place of another, once it is finished and on the disk.
+def drafted(root: Path, replacing: bool = False) -> Iterator[Layout]:
+    """Provide an empty folder that takes a name, once it is finished and on the disk.
+
+    Args:
+        root: The name.
+        replacing: Whether it takes the place of a folder, whose lock the caller holds.
 
     Raises:
         HandrailError: Another process writes there.
-        OSError: The disk does not take it.
+        OSError: The disk does not take it, or somebody else has taken the name meanwhile.
     """
     draft = Layout(_draft(root))
-    with DatasetLock(draft.staging):
+    with DatasetLock(draft.staging) as lock:
         try:
             for path in set(draft.root.iterdir()) - {draft.staging}:  # of a writing that was cut short
                 remove(path)
-            clear_staging(draft)
             yield draft
+            clear_staging(draft)
+            publish_folder(draft.root, root, replacing)
         except BaseException:
-            remove(draft.root)
+            if root.exists() or not replacing:  # else it has no name, and `settle` goes on
+                remove(draft.root)
             raise
-    publish_folder(draft.root, root)
+        lock.moved(Layout(root).staging)
 
 
 def remove_whole(root: Path) -> None:
@@ -106,29 +113,20 @@ def settle(root: Path) -> bool:
     """Finish a writing anew that was cut short; return whether one was past the point of no return.
 
     Raises:
+        HeldError: It is not cut short: another process is writing.
         OSError: Something cannot be renamed or removed.
     """
-    old, draft = beside(root, "old"), _draft(root)  # as `publish_folder` calls them
-    finished = old.exists()
-    if finished:
-        if not root.exists():
-            os.replace(draft if draft.exists() else old, root)
-            sync_folder(root.parent)
-        remove(old)
-    if not _in_use(draft):
-        remove(draft)
+    old, draft = beside(root, "old"), Layout(_draft(root))  # as `publish_folder` calls them
+    finished, drafted = old.exists(), draft.root.exists()
+    if finished or drafted:
+        with DatasetLock(draft.staging) as lock:
+            if finished and not root.exists():
+                os.replace(draft.root if drafted else old, root)
+                lock.moved(Layout(root).staging)
+                sync_folder(root.parent)
+            remove(old)
+            remove(draft.root)
     return finished
-
-
-def _in_use(draft: Path) -> bool:
-    """Return whether another process writes a draft."""
-    if not draft.is_dir():
-        return False
-    try:
-        DatasetLock(draft / STAGING).release()
-    except HandrailError:
-        return True
-    return False
 
 
 def _copy_folder(source: Path, target: Path, ours: Sequence[str] = ()) -> None:
@@ -145,6 +143,7 @@ def _copy_folder(source: Path, target: Path, ours: Sequence[str] = ()) -> None:
 def _second_name(source: str | Path, target: str | Path) -> None:
     """Give a file a second name, or copy it where the file system has no such thing."""
     remove(Path(target))
+    make_folder(Path(target).parent)
     try:
         os.link(regular(Path(source)), target)
     except OSError:

@@ -57,9 +57,7 @@ class Survey:
     @property
     def damage(self) -> tuple[str, ...]:
         """What is wrong, one text an episode."""
-        faults = [
-            (group.first + place, each) for group in self.groups for place, each in enumerate(group.faults)
-        ]
+        faults = [each for group in self.groups for each in enumerate(group.faults, group.first)]
         return tuple(f"episode {number}: {fault}" for number, fault in faults if fault)
 
     @property
@@ -90,10 +88,10 @@ def survey(layout: Layout, manifest: Manifest, sums: Checksums) -> Survey:
     """Look at everything, change nothing; remember the checksums."""
     rows = row_files(layout)
     streams = sorted((*layout.root.glob("videos/*/*/*.mp4"), *layout.root.glob("data/*/*.parquet")))
-    groups = {number: path for path in rows if (number := episode_of(path)) is not None}
+    groups = _heads({number: path for path in rows if (number := episode_of(path)) is not None})
     numbered = {path: number for path in streams if (number := episode_of(path)) is not None}
     saved, counted = _end(groups), _saved_in_info(layout)
-    inside = _inside(numbered, groups)
+    inside = _inside(numbered, groups) | (set(rows) - set(groups.values()))
     begun = {number for path, number in numbered.items() if path not in inside}
     beyond = {number for number in begun if number >= saved}
     interrupted = beyond == {saved} and counted is not None and counted <= saved  # a crash: the next one's
@@ -109,6 +107,15 @@ def survey(layout: Layout, manifest: Manifest, sums: Checksums) -> Survey:
     leftovers = tuple(path for path, number in numbered.items() if interrupted and number == saved)
     unknown = tuple(path for path in (*streams, *rows) if episode_of(path) is None or path in inside)
     return Survey(layout, states, totals, leftovers, unknown)
+
+
+def _heads(rows: Mapping[int, Path]) -> dict[int, Path]:
+    """Return the files of episode rows but for those whose episodes are in the one before."""
+    heads, end = dict[int, Path](), 0
+    for number, path in sorted(rows.items()):
+        if number >= end:
+            heads[number], end = path, number + count_rows(path)
+    return heads
 
 
 def _inside(numbered: Mapping[Path, int], groups: Mapping[int, Path]) -> set[Path]:

@@ -37,6 +37,7 @@ from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.episode import OpenEpisode
 from handrail.datasets.recording.folder import check_folders, check_target, clear_dataset, clear_staging
 from handrail.datasets.recording.repair import RepairReport, tidy_locked
+from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.storage.atomic import (
     explained,
     make_folder,
@@ -93,10 +94,11 @@ class EpisodeWriter:
             overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
             types: Of the extra columns; the first episode fixes them without.
         """
-        layout = Layout(Path(root).expanduser().absolute())
+        layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
         manifest.check()
-        check_target(layout, overwrite)
         with explained(f"cannot create dataset {str(layout.root)!r}"), contextlib.ExitStack() as on_error:
+            settle(layout.root)
+            check_target(layout, overwrite)
             lock = on_error.enter_context(DatasetLock(layout.staging))
             check_target(layout, overwrite)  # again: another recorder may have been faster
             clear_dataset(layout)
@@ -115,13 +117,14 @@ class EpisodeWriter:
                 session and are kept with each of its episodes.
             verify: Read every file anew, also those that have not changed since they were last checked.
         """
-        layout = Layout(Path(root).expanduser().absolute())
-        existing = read_manifest(layout)
-        manifest.check()
-        manifest.check_fits(existing, f"--resume: cannot add to {str(layout.root)!r}")
-        check_folders(layout)
+        layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
         words = f"--resume: cannot add to dataset {str(layout.root)!r}"
         with explained(words), contextlib.ExitStack() as on_error:
+            settle(layout.root)
+            existing = read_manifest(layout)
+            manifest.check()
+            manifest.check_fits(existing, words)
+            check_folders(layout)
             lock = on_error.enter_context(DatasetLock(layout.staging))
             report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
             types = read_column_types(row_files(layout)[-1]) if totals.episodes else None
@@ -180,7 +183,7 @@ class EpisodeWriter:
         try:
             totals = self._stage(extras, types)
             self._publish(totals)
-        except (OSError, HandrailError) as error:
+        except (OSError, HandrailError, ValueError, OverflowError) as error:  # a text that is none
             with contextlib.suppress(OSError):  # the next save overwrites leftovers, `repair` removes them
                 for _, path in self._streams():
                     remove(path)
@@ -207,8 +210,11 @@ class EpisodeWriter:
         self._discard()
 
     def erase_if_empty(self) -> None:
-        """Remove the dataset if it has no episode; one whose saving was interrupted is left for `resume`."""
-        if self.num_episodes or self._unusable:
+        """Remove the dataset if it has no episode; one whose saving was interrupted is left for `resume`.
+
+        One with episodes that were set aside stays too.
+        """
+        if self.num_episodes or self._unusable or self._layout.damaged.exists():
             return
         with explained(f"cannot remove the empty dataset {str(self.root)!r}"):
             self._discard()

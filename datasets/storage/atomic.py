@@ -46,14 +46,18 @@ def write_synced(path: Path, data: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def sync_file(path: Path) -> None:
-    """Wait until the disk has a file that something else has written."""
-    _sync(path, os.O_RDONLY)
+def sync_file(path: Path, flags: int = os.O_RDONLY) -> None:
+    """Wait until the disk has a file that something else has written, or a folder, opened with some flags."""
+    descriptor = os.open(path, flags | os.O_NONBLOCK)  # a named pipe would wait
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def sync_folder(path: Path) -> None:
     """Wait until the disk has the names in a folder."""
-    _sync(path, os.O_RDONLY | os.O_DIRECTORY)
+    sync_file(path, os.O_RDONLY | os.O_DIRECTORY)
 
 
 def make_folder(path: Path) -> None:
@@ -91,20 +95,26 @@ def write_whole(path: Path, data: bytes) -> None:
     sync_folder(path.parent)
 
 
-def publish_folder(draft: Path, final: Path) -> None:
-    """Give a finished folder its name, with everything in it on the disk; one of that name is replaced.
+def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
+    """Give a finished folder its name, with everything in it on the disk.
 
-    The old one is renamed first and removed last, so that one of the two is always there whole.
+    One that is replaced is renamed first and removed last, so that one of the two is always there whole.
+
+    Args:
+        draft: The folder.
+        final: Its name.
+        replacing: Whether a folder of that name is replaced; without, it must be missing or empty.
 
     Raises:
-        OSError: The disk does not take it.
+        OSError: The disk does not take it, or somebody else has made a folder of that name meanwhile.
     """
     for path in (draft, *draft.rglob("*")):
-        _sync(path, os.O_RDONLY)
+        sync_file(path)
     old = beside(final, "old")
-    remove(old)
-    if final.exists():
-        os.replace(final, old)
+    if replacing:
+        remove(old)
+        if final.exists():
+            os.replace(final, old)
     os.replace(draft, final)
     sync_folder(final.parent)
     remove(old)
@@ -123,11 +133,3 @@ def remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
-
-
-def _sync(path: Path, flags: int) -> None:
-    descriptor = os.open(path, flags | os.O_NONBLOCK)  # a named pipe would wait
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -40,12 +40,15 @@ class DatasetLock:
         if self._file is None:
             return
         file, self._file = self._file, None
-        try:
-            self._path.unlink(missing_ok=True)
-            with contextlib.suppress(OSError):  # not empty: somebody else's already, or worth a look
-                self._path.parent.rmdir()
-        finally:
-            file.close()
+        with file:
+            if self._is_current(file):  # else the folder was replaced, and what is there is somebody else's
+                self._path.unlink()
+                with contextlib.suppress(OSError):  # not empty: worth a look
+                    self._path.parent.rmdir()
+
+    def moved(self, staging: Path) -> None:
+        """Take note of where the locked staging folder is since its dataset was renamed."""
+        self._path = staging / LOCK_NAME
 
     def __enter__(self) -> Self:
         return self

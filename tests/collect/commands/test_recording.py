@@ -1,15 +1,19 @@
 """Laws of a cockpit's folder, said or not: a dataset that fits goes on, another one is left alone."""
 
+import shutil
 from dataclasses import replace
 
 import pytest
+from command_helpers import ran
 
 from handrail.collect.commands.account import next_commands
 from handrail.collect.commands.record import record
 from handrail.collect.commands.recording import located, open_writer, session_writer
+from handrail.collect.commands.shared import record_shard
 from handrail.collect.config import DatasetConfig, DriveConfig, FoundDatasetConfig, RecordConfig
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.reading.reader import read_episodes
 
 PLAIN = DriveConfig(physics=False)
 ENV = build_env(PLAIN, PLAIN.dataset.fps)
@@ -49,6 +53,24 @@ def test_one_of_another_rate_or_robot_or_no_dataset_is_left_alone(tmp_path):
     assert opened(replace(PLAIN, robot="ridgeback_panda"))[0].name == "reach-4"
     assert opened(faster)[0].name == "reach-2"
     assert {path: path.read_bytes() for path in first.rglob("*") if path.is_file()} == before
+
+
+def test_no_episode_is_recorded_again_after_an_edit(tmp_path):
+    """At once, in two goes, or by a worker: an edit gives episodes other numbers, and seeds follow."""
+    flags = ("--task", "reach", "--time_limit", "0.2", "--no_physics", "--dataset.num_episodes")
+    root, once, part = tmp_path / "d", tmp_path / "at_once", tmp_path / "part"
+    ran(root, *flags, 7)
+    ran(root, "--episodes", "1,3,4", "--in_place", name="delete")
+    shutil.copytree(root, once)
+    before = [row["seed"] for row in read_episodes(root)]
+    dataset = DatasetConfig(root=str(root), num_episodes=6)
+    record_shard(RecordConfig(task="reach", time_limit=0.2, physics=False, dataset=dataset), part, 4, 6)
+    ran(once, *flags, 6, "--resume")
+    for episodes in (2, 4):
+        ran(root, *flags, episodes, "--resume")
+    seeds, alone, shared = ([row["seed"] for row in read_episodes(each)] for each in (root, once, part))
+    assert seeds == alone == before + shared
+    assert len(set(seeds)) == 10
 
 
 def test_a_folder_that_is_said_goes_on_and_is_never_another(tmp_path):

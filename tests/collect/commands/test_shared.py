@@ -18,7 +18,9 @@ from shared_helpers import content, saved, started, wait_until, workers_of
 
 from handrail.collect.commands.shared import Shards
 from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_info
+from handrail.datasets.recording.repair import repair
 
 # a second each: most fail, which is no matter
 FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3"]
@@ -170,6 +172,15 @@ def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
     shutil.rmtree(shards)
 
 
+def test_what_is_left_of_shards_that_were_being_removed_is_no_part_of_the_next_recording(alone, tmp_path):
+    root, shards = tmp_path / "d", tmp_path / ".d.shards"
+    record(tmp_path / "other", "--seed", "4", episodes=5)
+    shards.mkdir()
+    (tmp_path / "other").rename(shards / "shard-0000000")  # killed after their plan was removed
+    record(root, "--workers", "2")
+    assert content(root) == alone
+
+
 @pytest.mark.parametrize(
     ("episodes", "settings", "expected"),
     [
@@ -203,3 +214,15 @@ def test_all_cores_record_where_that_pays_and_is_safe(episodes, settings, expect
 def test_what_cannot_be_shared_is_one_line(flags, words, tmp_path):
     refused(tmp_path / "d", *FLAGS, "--workers", "2", *flags, told=words)
     assert not os.listdir(tmp_path)
+
+
+def test_what_was_set_aside_is_still_there_when_shards_have_become_a_part(tmp_path):
+    root = tmp_path / "d"
+    record(root, episodes=2)
+    Layout(root).row(1).write_bytes(b"torn")
+    assert repair(root, set_aside_damaged=True).episodes == 1
+    kept = {path.name: path.read_bytes() for path in (root / ".damaged").rglob("*.parquet")}
+    assert kept
+    record(root, "--resume", "--workers", "2", episodes=6)
+    assert read_info(root).episodes == 7
+    assert {path.name: path.read_bytes() for path in (root / ".damaged").rglob("*.parquet")} == kept

@@ -160,3 +160,15 @@ def test_a_base_whose_next_command_is_late_is_sent_the_stop_and_that_is_said(cap
     with caplog.at_level(logging.WARNING):
         link.close()
     assert "commands were late" in caplog.text
+
+
+def test_a_dataset_that_cannot_say_what_was_driven_is_refused_before_the_robot_moves(tmp_path):
+    """Before, the first episode was driven to its end, and could not be saved."""
+    simulated = ("--robot", "lekiwi", "--task", "reach", "--time_limit", "0.2", "--dataset.num_episodes", 1)
+    assert command(tmp_path / "set", *simulated).returncode == 0
+    client = PlayedClient()
+    done = recorded(client, tmp_path / "set", "--resume", "--dataset.num_episodes", 1)
+    assert done.returncode == 2, done.stderr
+    assert "its episodes have no 'robot_client'" in done.stderr
+    assert all(set(sent.values()) <= {0.0} for sent in client.sent)
+    assert len(read_episodes(tmp_path / "set")) == 1

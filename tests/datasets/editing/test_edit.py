@@ -9,6 +9,7 @@ from command_helpers import command
 from datasets_helpers import CAMERAS, TASKS, brightness, open_with_lerobot, tree
 from editing_helpers import LENGTH, MOVING, STILL, record_episodes
 
+from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes, read_frames
@@ -210,3 +211,46 @@ def test_an_edit_that_was_cut_short_is_finished_and_not_done_twice(tmp_path):
     assert "was cut short, and is finished now" in said
     assert [row["seed"] for row in read_episodes(root)] == [1, 2, 3]
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+MINE = ("notes.txt", "meta/notes.txt", "data/chunk-000/notes.txt", "videos/mine/notes.txt")
+
+
+@pytest.mark.parametrize("mine", MINE)
+def test_an_edit_in_place_keeps_what_others_put_there(recorded, tmp_path, mine):
+    root = copied(tmp_path / "set", record_episodes, cameras=True)
+    (root / mine).parent.mkdir(exist_ok=True)
+    (root / mine).write_text("mine")
+    edit("delete --episodes 0 --in_place", root)
+    assert (root / mine).read_text() == "mine"
+    assert not (root / "data/chunk-000/file-001.parquet").exists()
+    check(root, recorded, [1, 2, 3])
+
+
+def test_an_edit_in_place_removes_no_file_of_no_episode(tmp_path):
+    root = copied(tmp_path / "set", record_episodes, cameras=True)
+    stray = root / "data/chunk-000/mine.parquet"
+    stray.write_bytes(b"mine")
+    assert ".damaged" in edit("delete --episodes 0 --in_place", root, code=2).stderr
+    assert [path.read_bytes() for path in (root / ".damaged").rglob("mine.parquet")] == [b"mine"]
+    assert len(read_episodes(root)) == 4
+
+
+@pytest.mark.parametrize("output", ["--in_place", "--output {}/new"])
+def test_a_link_stays_and_what_it_leads_to_is_edited(recorded, tmp_path, output):
+    for name in ("set", "new"):
+        (tmp_path / "far").mkdir(exist_ok=True)
+        (tmp_path / name).symlink_to(tmp_path / "far" / name)
+    copied(tmp_path / "far" / "set", record_episodes, cameras=True)
+    edit(f"delete --episodes 0 {output.format(tmp_path)}", tmp_path / "set")
+    check(tmp_path / "far" / ("set" if output == "--in_place" else "new"), recorded, [1, 2, 3])
+    assert all((tmp_path / name).is_symlink() for name in ("set", "new"))
+
+
+def test_what_is_dropped_behind_a_link_is_gone(tmp_path):
+    root = copied(tmp_path / "far", record_episodes, cameras=True)
+    (tmp_path / "set").symlink_to(root)
+    assert drop_episodes(tmp_path / "set", lambda row: row["seed"] > 1) == 2
+    assert [row["seed"] for row in read_episodes(root)] == [0, 1]
+    assert drop_episodes(tmp_path / "set", lambda row: True) == 2
+    assert not root.exists()

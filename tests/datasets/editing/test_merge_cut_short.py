@@ -12,7 +12,7 @@ from editing_helpers import content, part
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.config import SplitConfig
 from handrail.datasets.editing.edit import edit
-from handrail.datasets.editing.merge import merge_datasets
+from handrail.datasets.editing.merge import drop_episodes, merge_datasets
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.recording.rewrite import settle
@@ -29,6 +29,15 @@ def test_a_merge_that_fails_changes_nothing(tmp_path):
         with pytest.raises(HandrailError, match=r"two.*damaged"):
             merge_datasets([root, other], output)
         assert tree(tmp_path) == before
+
+
+def test_a_dataset_that_was_copied_in_part_is_not_taken_for_an_empty_one(tmp_path):
+    one, other = (record(tmp_path / name, 2, features=TINY_FEATURES) for name in ("one", "other"))
+    shutil.rmtree(other / "meta" / "episodes")
+    for act in (lambda: merge_datasets([one, other], tmp_path / "both"), lambda: drop_episodes(other, bool)):
+        with pytest.raises(HandrailError, match="copied in part: 2 of 2 episodes"):
+            act()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "other"]
 
 
 @pytest.mark.parametrize("step", [8, pytest.param(1, marks=pytest.mark.slow)])

@@ -2,19 +2,27 @@
 
 import json
 import os
+import shutil
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from canned import copied
 from command_helpers import command, ran, refused
 from compare_helpers import JOINTS, lerobot_dataset, quick_and_slow
-from datasets_helpers import record, tree
+from datasets_helpers import TINY_FEATURES, record, record_one, resume, tree
+from editing_helpers import content
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.merge import merge_datasets
+from handrail.datasets.format.episode_rows import EpisodeRows
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.metadata import Checksum
 from handrail.datasets.reading.check import check_report, check_whole
+from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording import checksums
+from handrail.datasets.recording.repair import repair
 from handrail.policies.imitation.config import StoredConfig, TrainConfig
 from handrail.policies.imitation.training.source import read_source
 
@@ -53,9 +61,9 @@ def test_a_whole_dataset_is_hashed_once(root, hashed):
 
 def test_torn_memory_is_no_memory(root, hashed):
     check_whole(root)
-    for content in (b"{", b"[]", b'{"data/chunk-000/file-000.parquet": 3}', b"\xff" * 9):
+    for torn in (b"{", b"[]", b'{"data/chunk-000/file-000.parquet": 3}', b"\xff" * 9):
         for path in checksums.memory_folder().iterdir():
-            path.write_bytes(content)
+            path.write_bytes(torn)
         hashed.clear()
         check_whole(root)
         assert len(hashed) == 12
@@ -102,8 +110,6 @@ def test_a_dataset_of_lerobot_copied_in_part_is_named_as_such(tmp_path):
 def test_what_lerobot_adds_is_read_and_checked(tmp_path):
     """A dataset that LeRobot has recorded on has lines without checksums: it is read, but not resumed."""
     root = record(tmp_path / "set", 2)
-    import pyarrow.parquet as pq
-
     layout = Layout(root)
     for number in range(2):
         table = pq.read_table(layout.row(number))
@@ -117,3 +123,86 @@ def test_statistics_that_are_no_json_are_noticed(root):
     stats["action"]["max"] = [np.inf, 1.0]
     Layout(root).stats.write_text(json.dumps(stats))
     assert [fault.partition(":")[0] for fault in check_report(root)] == ["meta/stats.json"]
+
+
+@pytest.mark.parametrize("name", ["info.json", "tasks.parquet", "stats.json"])
+def test_a_summary_that_is_not_there_or_of_other_episodes_is_noticed_and_mended(root, name):
+    path = Layout(root).info.with_name(name)
+    whole = path.read_bytes()
+    if name == "info.json":  # as a crash leaves it between an episode and its summary
+        path.write_bytes(whole.replace(b'"total_episodes": 4', b'"total_episodes": 3'))
+    else:
+        path.unlink()
+    assert [fault.partition(":")[0].rpartition("/")[2] for fault in check_report(root)] == [name]
+    repair(root)
+    assert check_report(root) == []
+    assert path.read_bytes() == whole
+
+
+@pytest.mark.parametrize("kept", [0.5, 0.0])
+def test_a_video_of_lerobot_that_is_cut_off_is_noticed(tmp_path, kept):
+    root = lerobot_dataset(tmp_path / "set", JOINTS, 30, 0.0, camera=True)
+    video = next(root.glob("videos/*/*/*.mp4"))
+    os.truncate(video, int(kept * video.stat().st_size))
+    assert "file-000.mp4" in check_report(root)[0]
+
+
+def test_a_packed_dataset_that_was_copied_over_its_single_files_is_read_as_packed(tmp_path):
+    root = record(tmp_path / "set", 4)
+    single = shutil.copytree(root, tmp_path / "copy")
+    merge_datasets([root], root)
+    wanted = content(root)
+    shutil.copytree(root, single, dirs_exist_ok=True)
+    assert len(check_report(single)) == 6  # rows and lines of three episodes
+    with resume(single) as writer:
+        assert record_one(writer, cameras=False) == 4
+    assert content(single)[:4] == wanted
+    assert check_report(single) == []
+    assert len([path for path in (single / ".damaged").rglob("*") if path.is_file()]) == 6
+
+
+@pytest.mark.parametrize("said", [None, "x"])
+def test_a_place_in_a_video_that_is_no_number_is_one_line(tmp_path, said):
+    root = lerobot_dataset(tmp_path / "set", JOINTS, 30, 0.0, camera=True)
+    path = next(root.glob("meta/episodes/*/*"))
+    table = pq.read_table(path)
+    name = next(name for name in table.column_names if name.endswith("from_timestamp"))
+    place = table.schema.get_field_index(name)
+    pq.write_table(table.set_column(place, name, pa.array([said] * len(table))), path)
+    assert "episode 0: " in check_report(root)[0]
+
+
+@pytest.mark.parametrize("name", ["safety.contacts", "engaged"])
+def test_a_value_that_is_not_there_is_no_number(tmp_path, name):
+    root = record(tmp_path / "set", 1)
+    path = Layout(root).data(0)
+    table = pq.read_table(path)
+    place = table.schema.get_field_index(name)
+    values = table.column(name).to_pylist()
+    gap = pa.array([*values[:2], None, *values[3:]], table.schema.field(place).type)
+    pq.write_table(table.set_column(place, name, gap), path)
+    with pytest.raises(HandrailError, match=r"\A[^\n]*1 rows without a value where (int64|bool)[^\n]*\Z"):
+        read_frames(root, 0)
+
+
+def test_no_bit_of_a_line_of_metadata_is_taken_for_another(tmp_path):
+    root = record(tmp_path / "set", 3, features=TINY_FEATURES)
+    merge_datasets([root], root)
+    path, wanted = Layout(root).row(0), read_episodes(root)
+    whole = path.read_bytes()
+    pages = len(whole) - 8 - pq.read_metadata(path).serialized_size
+    for place in range(4, pages, 29):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        for read in (lambda: read_episodes(root), lambda: list(EpisodeRows.read(path).rows)):
+            try:
+                assert read() == wanted
+            except (HandrailError, OSError, ValueError):
+                continue
+
+
+@pytest.mark.parametrize("of", ["meta/tasks.parquet", "meta/episodes/chunk-000/file-000.parquet"])
+def test_another_file_under_the_name_of_one_of_rows_is_one_line(root, of):
+    shutil.copyfile(root / of, Layout(root).data(0))
+    with pytest.raises(HandrailError, match=r"\A[^\n]*\Z"):
+        read_frames(root, 0)
+    assert "episode 0: data/" in check_report(root)[0]

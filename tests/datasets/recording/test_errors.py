@@ -133,6 +133,26 @@ def test_frames_that_do_not_fit(tmp_path, change, words):
         writer.save_episode()
 
 
+@pytest.mark.parametrize(
+    ("change", "task", "said"),
+    [
+        ({"teleop.mode": "\udcff"}, "task", {"seed": 1}),
+        ({}, "\udcff", {"seed": 1}),
+        ({}, "task", {"seed": 1, "failure_reason": "\udcff"}),
+        ({}, "task", {"seed": 2**64}),
+    ],
+)
+def test_what_no_file_takes_costs_one_episode(tmp_path, change, task, said):
+    with create(tmp_path / "set") as writer:
+        record_one(writer, cameras=False)
+        writer.add_frame(frame_of(1, 0, cameras=False) | change, task)
+        fails(
+            lambda: writer.save_episode(said), "episode 1", "could not be saved", "the 1 saved episodes are"
+        )
+        assert record_one(writer, cameras=False) == 1
+    assert len(read_episodes(tmp_path / "set")) == 2
+
+
 def test_whole_numbers_must_fit_and_pictures_must_be_bytes():
     features = {"n": Feature("int8"), "camera": Feature("video", (32, 32, 3))}
     picture = np.zeros((32, 32, 3), np.uint8)

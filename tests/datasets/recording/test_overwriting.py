@@ -37,6 +37,25 @@ def test_an_existing_dataset_is_overwritten_when_asked(tmp_path):
     assert len(list(root.glob("data/*/*"))) == 1
 
 
+def test_the_picture_of_a_card_is_ours(tmp_path):
+    root = record(tmp_path / "set", 1)
+    (root / "meta" / "preview.webp").write_bytes(b"a picture")
+    create(root, overwrite=True).close()
+    assert not (root / "meta" / "preview.webp").exists()
+
+
+def test_what_was_set_aside_outlives_a_recording_without_an_episode(tmp_path):
+    root = record(tmp_path / "set", 2)
+    for number in range(2):
+        Layout(root).row(number).write_bytes(b"torn")
+    assert repair(root, set_aside_damaged=True).episodes == 0
+    kept = tree(root / ".damaged")
+    assert len(kept) == 4
+    with resume(root) as writer:
+        writer.erase_if_empty()
+    assert tree(root / ".damaged") == kept
+
+
 @pytest.mark.parametrize(
     "mine",
     [
