@@ -1,6 +1,7 @@
 """The statistics of a comparison: published values, and that chance is not taken for a difference."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -255,4 +256,5 @@ def test_ten_thousand_long_rollouts_can_be_read_again(tmp_path):
 def test_thousands_of_trials_are_compared_by_a_test_that_takes_no_minutes(monkeypatch):
     monkeypatch.setattr("scipy.stats.boschloo_exact", pytest.fail)
     many = unpaired_shares([True] * 900 + [False] * 1100, [True] * 1000 + [False] * 1000)
-    assert many.p == pytest.approx(fisher_exact([[900, 1000], [1100, 1000]]).pvalue)
+    exact: Any = fisher_exact([[900, 1000], [1100, 1000]])
+    assert many.p == pytest.approx(exact.pvalue)
