@@ -150,6 +150,11 @@ WRONG = {
         "velocity = [1.0, 1.0, 0.8, 0.1, 9.0",
         "velocity of at most 7.0",
     ),
+    "faster": (
+        r"velocity = \[1.0, 1.0, 0.8, 0.1, 2.0",
+        "velocity = [1.0, 1.0, 0.8, 0.1, 3.0",
+        "velocity of at most 2, got 3.0",
+    ),
     "urdf": (r'urdf = "two.urdf"', 'urdf = "two.toml"', "URDF"),
     "toml": (r"^name = ", "name ", "not valid TOML"),
 }
