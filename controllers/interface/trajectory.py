@@ -21,16 +21,14 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
-        velocities = frozen(self.velocities)
-        shape = velocities.shape
-        if len(shape) != 2 or not shape[0] or not 0.0 < self.dt < np.inf:
-            raise HandrailError(f"trajectory: expected velocities (k, n), dt > 0; got {shape}, {self.dt}")
+        velocities, dt = frozen(self.velocities), self.dt
+        if velocities.ndim != 2 or not len(velocities) or not 0.0 < dt < np.inf:
+            raise HandrailError(f"trajectory: expected velocities (k, n), dt > 0; got {velocities.shape}, {dt}")
         object.__setattr__(self, "velocities", velocities)
 
     def velocity(self, time: float) -> FloatArray:
         """Return the velocity `time` [s] from now, (n,); zero after the last knot."""
-        knot = (max(time, 0.0) + self.elapsed) / self.dt
-        last = len(self.velocities) - 1
+        knot, last = (max(time, 0.0) + self.elapsed) / self.dt, len(self.velocities) - 1
         if knot >= last:
             return np.zeros_like(self.velocities[0]) if self.is_over(time) else self.velocities[-1]
         index, weight = int(knot), knot - int(knot)

@@ -92,9 +92,8 @@ class RobotModel:
 
     def jacobian(self, q: FloatArray, frame: str = "") -> FloatArray:
         """Return J with twist = J v, world-aligned at a frame's origin, linear rows first, (6, n)."""
-        data, q = self._at(q)
-        number, axes = self.frame_id(frame), pin.LOCAL_WORLD_ALIGNED
-        return pin.computeFrameJacobian(self.pinocchio, data, q, number, axes).copy()
+        (data, q), number = self._at(q), self.frame_id(frame)
+        return pin.computeFrameJacobian(self.pinocchio, data, q, number, pin.LOCAL_WORLD_ALIGNED).copy()
 
     def _at(self, q: FloatArray) -> tuple[pin.Data, FloatArray]:
         """Return what this thread computes in, and q, (n,)."""
@@ -224,8 +223,7 @@ def _arm(arm: Arm, robot: str) -> pin.Model:
     if missing := sorted(set(arm.joints) - set(model.names)):
         raise unknown_name(f"arm joint of robot {robot}", missing[0], list(model.names)[1:])
     if led := [pair for pair in followers(arm) if set(pair) & set(arm.joints)]:
-        what = f"arm joints of robot {robot}: expected joints that move by themselves"
-        raise HandrailError(f"{what}; {led[0][0]} follows {led[0][1]} (mimic)")
+        raise HandrailError(f"arm joints of robot {robot}: expected no mimic, {' follows '.join(led[0])}")
     locked = [model.getJointId(name) for name in list(model.names)[1:] if name not in arm.joints]
     reduced = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
     if reduced.nq != reduced.nv or reduced.nv != len(arm.joints):
