@@ -21,10 +21,10 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
-        velocities, dt = frozen(self.velocities), self.dt
-        if velocities.ndim != 2 or not len(velocities) or not 0.0 < dt < np.inf:
-            raise HandrailError(f"trajectory: expected velocities (k, n), dt > 0; got {velocities.shape}, {dt}")
-        object.__setattr__(self, "velocities", velocities)
+        knots, dt = frozen(self.velocities), self.dt
+        if knots.ndim != 2 or not len(knots) or not 0.0 < dt < np.inf:
+            raise HandrailError(f"trajectory: expected velocities (k, n), dt > 0; got {knots.shape}, {dt}")
+        object.__setattr__(self, "velocities", knots)
 
     def velocity(self, time: float) -> FloatArray:
         """Return the velocity `time` [s] from now, (n,); zero after the last knot."""
