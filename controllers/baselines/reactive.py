@@ -17,6 +17,7 @@ from handrail.controllers.interface.validation import InputHistory, InputValidat
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
+from handrail.controllers.typed import Positive, check
 
 Ask = Callable[[State, Intent, FloatArray], FloatArray]
 """State, intent, velocity commanded last (n,) → velocity wanted (n,) [m/s, rad/s].
@@ -58,7 +59,7 @@ class ReactiveController:
         self._ask = ask
         self._limiter = Limiter(model.description)
         self._validator = InputValidator(self.channels, DEAD_MAN_TIME)
-        self._period = period
+        self._period = check(period, Positive, "control period [s]")
         self._foreign = np.zeros(self.channels.size, dtype=bool) if understood is None else ~understood
         self._margins = margins
         self.reset()

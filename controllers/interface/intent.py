@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, are_finite, frozen, real
+from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 
@@ -56,8 +57,10 @@ class Intent:
         object.__setattr__(self, "values", frozen(self.values, what="values of an intent"))
         object.__setattr__(self, "mask", frozen(self.mask, bool, "mask of an intent"))
         object.__setattr__(self, "time", real(self.time, "time of an intent"))
-        grippers = tuple(real(each, "gripper of an intent") for each in self.grippers)
-        object.__setattr__(self, "grippers", grippers)
+        grippers = frozen(self.grippers, what="grippers of an intent")
+        object.__setattr__(self, "grippers", tuple(grippers.ravel().tolist()))
+        if not isinstance(self.frames, Frames):
+            raise HandrailError(f"frames of an intent: expected Frames, got {shown(self.frames)}")
 
     @classmethod
     def idle(cls, channels: Channels, time: float = 0.0) -> "Intent":

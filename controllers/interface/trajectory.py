@@ -21,18 +21,17 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
-        velocities = frozen(self.velocities)
-        if velocities.ndim != 2 or not len(velocities):
-            raise HandrailError(f"trajectory: expected velocities (k, n), got shape {velocities.shape}")
-        object.__setattr__(self, "velocities", velocities)
+        knots, dt = frozen(self.velocities), self.dt
+        if knots.ndim != 2 or not len(knots) or not 0.0 < dt < np.inf:
+            raise HandrailError(f"trajectory: expected velocities (k, n), dt > 0; got {knots.shape}, {dt}")
+        object.__setattr__(self, "velocities", knots)
 
     def velocity(self, time: float) -> FloatArray:
         """Return the velocity `time` [s] from now, (n,); zero after the last knot."""
-        knot = (max(time, 0.0) + self.elapsed) / self.dt
-        index, last = int(knot), len(self.velocities) - 1
-        if index >= last:
+        knot, last = (max(time, 0.0) + self.elapsed) / self.dt, len(self.velocities) - 1
+        if knot >= last:
             return np.zeros_like(self.velocities[0]) if self.is_over(time) else self.velocities[-1]
-        weight = knot - index
+        index, weight = int(knot), knot - int(knot)
         return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]
 
     def is_over(self, time: float) -> bool:

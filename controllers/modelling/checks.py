@@ -33,10 +33,10 @@ def faults(robot: str | Path) -> list[str]:
 def _of_limits(model: RobotModel) -> Iterator[str]:
     limits, urdf, base = model.description.limits, model.pinocchio, len(model.description.base.joints)
     for index in range(model.size):
-        name, fastest = model.joints[index], FASTEST[int(joints_of(model)[index].prismatic)]
-        velocity = float(limits.velocity[index])
-        if velocity > fastest:
-            yield f"limits of joint {name}: expected a velocity of at most {fastest}, got {velocity}"
+        name, velocity = model.joints[index], float(limits.velocity[index])
+        fastest = min(FASTEST[int(joints_of(model)[index].prismatic)], urdf.velocityLimit[index] or np.inf)
+        if velocity > fastest + _OVER:
+            yield f"limits of joint {name}: expected a velocity of at most {fastest:.6g}, got {velocity}"
         time = velocity / float(limits.acceleration[index])
         if not _SOONEST <= time <= _SLOWEST:
             yield f"limits of joint {name}: expected full velocity in {_SOONEST} to {_SLOWEST} s"

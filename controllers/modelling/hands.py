@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.modelling.clouds import LinkCloud, body_frame, urdf_clouds
-from handrail.controllers.robot.model import read_urdf
+from handrail.controllers.robot.model import read_urdf, twist_of
 from handrail.controllers.robot.parts import Arm
 
 _NEAR = 0.01  # of a hand's frame to its joint, where that does not say which way it points [m]
@@ -50,9 +50,7 @@ class HandFinder:
             carried = [link.triangles.reshape(-1, 3) for link in self._links if link.joint == joint]
             back = np.vstack(carried).mean(axis=0) if carried else -placement.rotation[:, 2]
             away = placement.translation - back
-        data = self.model.joints[joint].createData()
-        self.model.joints[joint].calc(data, np.zeros(1))
-        turn = np.asarray(data.S).reshape(6)[3:]
+        turn = twist_of(self.model, joint)[1]
         if abs(turn @ away) > _ROLLS * np.linalg.norm(away):
             away = turn * (turn @ away)
         along = placement.rotation.T @ away

@@ -64,6 +64,6 @@ def _inertias(model: RobotModel, rng: np.random.Generator) -> FloatArray:
     """Return the largest inertia that each joint sees over random postures, (n,)."""
     robot, data = model.pinocchio, model.pinocchio.createData()
     ends = np.array([robot.lowerPositionLimit, robot.upperPositionLimit])
-    lower, upper = np.where((np.abs(ends) < 1e3).all(axis=0), ends, 0.0)
+    lower, upper = np.sort(np.where((np.abs(ends) < 1e3).all(axis=0), ends, 0.0), axis=0)
     postures = rng.uniform(lower, upper, (_POSES, model.size))
     return np.max([np.diag(pin.crba(robot, data, q)) for q in postures], axis=0)

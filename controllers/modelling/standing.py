@@ -69,7 +69,8 @@ def cameras(model: RobotModel) -> list[dict[str, Any]]:
     for hand in model.description.hands:
         tool, ahead = hand.placement.translation, hand.placement.rotation[:, 2]
         above = model.pose(home, hand.frame).rotation.T @ [0.0, 0.0, 1.0]
-        aside = above - ahead * (ahead @ above)
+        ways = [way - ahead * (ahead @ way) for way in (above, hand.placement.rotation[:, 0])]
+        aside = ways[int(np.linalg.norm(ways[0]) < 1e-3)]  # of a hand that points up or down, its x axis
         position = tool + scale * (0.12 * aside / np.linalg.norm(aside) - 0.17 * ahead)
         view = {"position": position, "looks_at": tool + scale * 0.05 * ahead, "up": above, "fovy": 85.0}
         found.append({"name": hand.named("wrist").replace(".", "_"), "frame": hand.frame} | view)

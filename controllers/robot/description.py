@@ -251,7 +251,7 @@ def _arm(arm: _Arm, folder: Path) -> Arm:
 
 def _check_joints(robot: RobotDescription) -> None:
     """Check one number a joint, and home inside the limits."""
-    _check_once(robot.arm_joints, "arm: joints")
+    check_once(robot.arm_joints, "arm: joints")
     limits, size = robot.limits, len(robot.joints)
     vectors = {f"limits: {name}": values for name, values in vars(limits).items()}
     for name, values in ({"home: q": robot.home} | vectors).items():
@@ -270,13 +270,13 @@ def _check_joints(robot: RobotDescription) -> None:
 
 def _check_names(robot: RobotDescription) -> None:
     """Check that shapes and cameras have names of their own, and that no others are used."""
-    _check_once(robot.camera_names, "camera")
+    check_once(robot.camera_names, "camera")
     names = [shape.name for shape in robot.collision]
-    _check_once(names, "collision")
+    check_once(names, "collision")
     if "" in names:
         raise HandrailError(f"collision[{names.index('')}]: expected an entry 'name', found none")
-    _check_once([" and ".join(sorted(pair)) for pair in robot.self_pairs], "self_collision: pairs")
-    _check_once([hand.name for hand in robot.hands], "hand: name")
+    check_once([" and ".join(sorted(pair)) for pair in robot.self_pairs], "self_collision: pairs")
+    check_once([hand.name for hand in robot.hands], "hand: name")
     for hand in robot.hands:
         if (len(robot.hands) > 1) != bool(_WORD.fullmatch(hand.name)) or hand.name in _TAKEN:
             words = "a name such as left of each of several, none of the only one"
@@ -290,6 +290,7 @@ def _check_names(robot: RobotDescription) -> None:
         raise HandrailError(f"self_collision: pairs: expected two shapes, got {same[0]!r} twice")
 
 
-def _check_once(names: Sequence[str], where: str) -> None:
+def check_once(names: Sequence[str], where: str) -> None:
+    """Check that no name is there twice."""
     if twice := [name for name in names if names.count(name) > 1]:
         raise HandrailError(f"{where}: expected each once, got {twice[0]!r} twice")

@@ -1,24 +1,25 @@
 """The kinematic model of a robot: pinocchio's, built from the description."""
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import re
+import tempfile
+from collections import defaultdict
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from threading import get_ident
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.arrays import BoolArray, FloatArray, frozen
 from handrail.controllers.core.library import Memory, constant
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
-from handrail.controllers.robot.description import RobotDescription, load_description
+from handrail.controllers.robot.description import RobotDescription, check_once, load_description
 from handrail.controllers.robot.parts import Arm, EndEffector, PlacedShape, Placement
-from handrail.controllers.robot.urdf import urdf_text
+from handrail.controllers.robot.urdf import followers, urdf_text
 
-_AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
 
 
@@ -48,7 +49,7 @@ class RobotModel:
         self.description, self.number, self.hand = description, hand, description.hands[hand]
         self.pinocchio = _build(description)
         self.size = self.pinocchio.nv
-        self._data = self.pinocchio.createData()
+        self._data: dict[int, pin.Data] = defaultdict(self.pinocchio.createData)  # of each thread
         self._frames = {frame.name: self.pinocchio.getFrameId(frame.name) for frame in self.pinocchio.frames}
 
     @property
@@ -84,15 +85,22 @@ class RobotModel:
 
     def pose(self, q: FloatArray, frame: str = "") -> Pose:
         """Return the pose of a frame at q, (n,); of the hand's tool by default."""
-        pin.forwardKinematics(self.pinocchio, self._data, q)
-        placement = pin.updateFramePlacement(self.pinocchio, self._data, self.frame_id(frame))
+        data, q = self._at(q)
+        pin.forwardKinematics(self.pinocchio, data, q)
+        placement = pin.updateFramePlacement(self.pinocchio, data, self.frame_id(frame))
         return Pose(placement.translation.copy(), placement.rotation.copy())
 
     def jacobian(self, q: FloatArray, frame: str = "") -> FloatArray:
         """Return J with twist = J v, world-aligned at a frame's origin, linear rows first, (6, n)."""
-        return pin.computeFrameJacobian(
-            self.pinocchio, self._data, q, self.frame_id(frame), pin.LOCAL_WORLD_ALIGNED
-        ).copy()
+        (data, q), number = self._at(q), self.frame_id(frame)
+        return pin.computeFrameJacobian(self.pinocchio, data, q, number, pin.LOCAL_WORLD_ALIGNED).copy()
+
+    def _at(self, q: FloatArray) -> tuple[pin.Data, FloatArray]:
+        """Return what this thread computes in, and q, (n,)."""
+        q = frozen(q, what="configuration")
+        if q.shape != (self.size,):
+            raise HandrailError(f"configuration: expected {self.size} numbers, got shape {q.shape}")
+        return self._data[get_ident()], q
 
 
 class Joint(NamedTuple):
@@ -108,7 +116,20 @@ class Joint(NamedTuple):
 @lru_cache(maxsize=8)
 def joints_of(model: RobotModel) -> tuple[Joint, ...]:
     """Return the joints, one a coordinate."""
-    return tuple(_joint(model, number) for number in range(1, model.pinocchio.njoints))
+    robot, found = model.pinocchio, []
+    for number in range(1, robot.njoints):
+        (linear, angular), place = twist_of(robot, number), robot.jointPlacements[number].copy()
+        slides = not angular.any()
+        axis = linear if slides else angular
+        found.append(Joint(robot.parents[number], place.translation, place.rotation, axis, slides))
+    return tuple(found)
+
+
+def twist_of(model: pin.Model, number: int) -> FloatArray:
+    """Return how a joint of one coordinate moves what it carries, (v, ω) as rows, (2, 3)."""
+    data = model.joints[number].createData()
+    model.joints[number].calc(data, np.zeros(1))
+    return np.array(data.S).reshape(2, 3)
 
 
 def joint_memory(model: RobotModel, shapes: int, pairs: int) -> Memory:
@@ -125,22 +146,6 @@ def joint_memory(model: RobotModel, shapes: int, pairs: int) -> Memory:
         memory.joint_rotation[index] = joint.rotation.ravel()
         memory.joint_position[index], memory.joint_axis[index] = joint.translation, joint.axis
     return memory
-
-
-def _joint(model: RobotModel, number: int) -> Joint:
-    joint, placement = model.pinocchio.joints[number], model.pinocchio.jointPlacements[number]
-    name = joint.shortname().removeprefix("JointModel")
-    if name in ("PX", "PY", "PZ", "RX", "RY", "RZ"):
-        axis = _AXES[name[1]]
-    elif name in ("RevoluteUnaligned", "PrismaticUnaligned"):
-        axis = np.array(joint.extract().axis)
-    else:
-        raise HandrailError(
-            f"joint {model.pinocchio.names[number]} of robot {model.description.name}: "
-            f"expected a revolute or prismatic joint, got {name}"
-        )
-    parts = placement.translation.copy(), placement.rotation.copy()
-    return Joint(model.pinocchio.parents[number], *parts, axis, name.startswith("P"))
 
 
 @lru_cache(maxsize=8)
@@ -161,13 +166,14 @@ def _build(description: RobotDescription) -> pin.Model:
     for name in description.base.joints:
         joint = base.addJoint(joint, _BASE_JOINTS[name](), pin.SE3.Identity(), name)
     base.addFrame(pin.Frame("planar_base", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
-    model = base
+    model, tools = base, [hand.named("tool") for hand in description.hands]
     for arm in description.arms:
         if not model.existFrame(arm.on):
-            raise HandrailError(
-                f"arm {arm.prefix!r} of robot {description.name}: on {arm.on!r}: no such frame"
-            )
-        model = pin.appendModel(model, _arm(arm, description.name), model.getFrameId(arm.on), _se3(arm.mount))
+            raise HandrailError(f"arm {arm.prefix!r} of robot {description.name}: on: no frame {arm.on!r}")
+        own = _arm(arm, description.name)
+        frames = [frame.name for each in (model, own) for frame in list(each.frames)[1:]]
+        check_once([*base.names, *tools, *frames], f"URDF {arm.urdf}: names of links and joints")
+        model = pin.appendModel(model, own, model.getFrameId(arm.on), _se3(arm.mount))
     if tuple(model.names[1:]) != description.joints:
         expected, got = (", ".join(names) for names in (list(model.names)[1:], description.joints))
         raise HandrailError(
@@ -193,40 +199,36 @@ def _check_hands(model: pin.Model, description: RobotDescription) -> None:
 
 def read_urdf(arm: Arm, mimic: bool = False) -> pin.Model:
     """Return all of an arm's URDF, every joint of it free; or with joints that follow another, as it says."""
-    try:
-        with _without_words():
-            return pin.buildModelFromXML(urdf_text(arm), mimic=mimic)
-    except (ValueError, RuntimeError) as error:
-        raise HandrailError(f"URDF {arm.urdf}: {message_of(error)}") from error
+    text, model, words = urdf_text(arm), None, ""
+    with tempfile.TemporaryFile("w+", errors="replace") as said:  # the reader prints what it leaves out
+        before = os.dup(2)
+        os.dup2(said.fileno(), 2)
+        try:
+            model = pin.buildModelFromXML(text, mimic=mimic)
+        except (ValueError, RuntimeError) as error:
+            words = message_of(error)
+        finally:
+            os.dup2(before, 2)
+            os.close(before)
+        said.seek(0)
+        words = "; ".join(re.findall(r"Error: +(.*)\n.*urdf_parser", said.read())[:2]) or words
+    if words or model is None:
+        raise HandrailError(f"URDF {arm.urdf}: {words}")
+    return model
 
 
 def _arm(arm: Arm, robot: str) -> pin.Model:
     """Return an arm with every joint that the description does not list locked at zero."""
     model = read_urdf(arm)
-    missing = set(arm.joints) - set(model.names)
-    if missing:
-        raise HandrailError(
-            f"arm joints {sorted(missing)} of robot {robot}: "
-            f"expected some of {', '.join(list(model.names)[1:])}"
-        )
+    if missing := sorted(set(arm.joints) - set(model.names)):
+        raise unknown_name(f"arm joint of robot {robot}", missing[0], list(model.names)[1:])
+    if led := [pair for pair in followers(arm) if set(pair) & set(arm.joints)]:
+        raise HandrailError(f"arm joints of robot {robot}: expected no mimic, {' follows '.join(led[0])}")
     locked = [model.getJointId(name) for name in list(model.names)[1:] if name not in arm.joints]
     reduced = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
     if reduced.nq != reduced.nv or reduced.nv != len(arm.joints):
         raise HandrailError(f"arm of robot {robot}: expected revolute or prismatic joints in its URDF")
     return reduced
-
-
-@contextmanager
-def _without_words() -> Iterator[None]:
-    """Silence what is written past Python: the reader of URDF prints its error, and raises it too."""
-    before, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    try:
-        yield
-    finally:
-        os.dup2(before, 2)
-        os.close(before)
-        os.close(nowhere)
 
 
 def _add_tool(model: pin.Model, hand: EndEffector, robot: str) -> None:

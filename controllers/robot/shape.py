@@ -6,11 +6,12 @@ from typing import Literal
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 
 ShapeKind = Literal["box", "capsule", "sphere", "cylinder"]
 
 _SIZES = {"box": 3, "capsule": 2, "sphere": 1, "cylinder": 2}
+_LARGEST = 1e100  # of a length [m]: its square is a number
 _ROTATION_ERROR = 1e-5  # of a matrix that still is a rotation; float32 has about 1e-7
 
 
@@ -28,10 +29,10 @@ class Shape:
         if self.kind not in _SIZES:
             raise HandrailError(f"shape {self.kind!r}: expected one of {', '.join(_SIZES)}")
         object.__setattr__(self, "size", frozen(self.size, what=f"size of a {self.kind}"))
-        if self.size.shape != (_SIZES[self.kind],) or not all(0.0 < length < np.inf for length in self.size):
+        count, usable = _SIZES[self.kind], np.all((self.size > 0.0) & (self.size < _LARGEST))
+        if self.size.shape != (count,) or not usable:
             raise HandrailError(
-                f"size of a {self.kind}: expected {_SIZES[self.kind]} positive lengths [m], "
-                f"got {self.size.tolist()}"
+                f"size of a {self.kind}: expected {count} positive lengths [m], got {self.size.tolist()}"
             )
 
 
@@ -50,9 +51,11 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
+        if not isinstance(self.shape, Shape):
+            raise HandrailError(f"shape of obstacle {self.name!r}: expected a Shape, got {shown(self.shape)}")
         for name in ("position", "velocity"):
             values = frozen(getattr(self, name), what=f"{name} of obstacle {self.name!r}")
-            if values.shape != (3,) or not np.isfinite(values).all():
+            if values.shape != (3,) or not np.all(np.abs(values) < _LARGEST):
                 raise HandrailError(
                     f"{name} of obstacle {self.name!r}: expected three finite numbers, got {values.tolist()}"
                 )

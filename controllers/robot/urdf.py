@@ -98,6 +98,12 @@ def chain(arms: Sequence[Arm], frame: str) -> Iterator[str]:
             yield joint
 
 
+def followers(arm: Arm) -> list[tuple[str, str]]:
+    """Return the joints that follow another one (`mimic`), and which, prefixes included."""
+    joints = ET.fromstring(urdf_text(arm)).findall("joint")
+    return [(each.get("name", ""), mimic.get("joint", "")) for each in joints for mimic in each.iter("mimic")]
+
+
 def mesh_files(urdf: Path, folder: Path) -> Iterator[Path]:
     """Yield the files of the meshes that a URDF names.
 

@@ -32,6 +32,32 @@ STUCK, JUMPED = "stands still", "jumps back"
 WALL = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 3.0, 0.0, 0.1])
 
 
+@pytest.mark.parametrize("period", [0.0, -0.05, np.nan, np.inf, "1", None])
+@pytest.mark.parametrize("build", [CbfFilter, DirectController])
+def test_a_period_that_is_none_is_refused(build, period):
+    with pytest.raises(HandrailError, match=r"^control period \[s\]: expected a number"):
+        build(MODEL, period)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Intent(np.zeros(18), np.zeros(18, bool), frames="tool"),  # type: ignore[arg-type]
+        lambda: Intent(np.zeros(18), np.zeros(18, bool), grippers=None),  # type: ignore[arg-type]
+        lambda: Obstacle("wall", "box", np.zeros(3)),  # type: ignore[arg-type]
+        lambda: Obstacle("wall", WALL.shape, np.array([1e200, 0.0, 0.0])),
+        lambda: Shape("sphere", np.array([1e200])),
+    ],
+)
+def test_what_is_no_part_of_an_input_is_one_line(make):
+    with pytest.raises(HandrailError, match=r"^[^\n]+expected [^\n]+, got [^\n]+$"):
+        make()
+
+
+def test_a_single_gripper_may_be_a_number():
+    assert Intent(np.zeros(18), np.zeros(18, bool), 0.5).grippers == (0.5,)  # type: ignore[arg-type]
+
+
 @pytest.fixture(params=CONTROLLERS)
 def driven(request):
     """Return a robot that has been driven for half a second, and what drives it."""

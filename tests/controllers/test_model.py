@@ -1,9 +1,12 @@
 """The model's laws: CasADi agrees with pinocchio, the description is checked."""
 
+import pickle
 import re
+from threading import Thread
 
 import casadi as ca
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from handrail.controllers.errors import HandrailError
@@ -33,6 +36,31 @@ def test_casadi_agrees_with_pinocchio(frame):
         np.testing.assert_allclose(position.ravel(), expected.position, atol=1e-9)
         np.testing.assert_allclose(rotation, expected.rotation, atol=1e-9)
         np.testing.assert_allclose(jacobian, MODEL.jacobian(x, frame), atol=1e-9)
+
+
+def test_threads_that_share_a_model_get_their_own_poses(monkeypatch):
+    """Whatever another thread asks for in the midst of it."""
+    home, update = MODEL.description.home, pin.updateFramePlacement
+    expected = MODEL.pose(home)
+
+    def interrupted(*args):
+        monkeypatch.setattr(pin, "updateFramePlacement", update)
+        (other := Thread(target=lambda: MODEL.pose(home + 0.3))).start()
+        other.join()
+        return update(*args)
+
+    monkeypatch.setattr(pin, "updateFramePlacement", interrupted)
+    pose = MODEL.pose(home)
+    np.testing.assert_array_equal(pose.position, expected.position)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(MODEL)).pose(home).rotation, expected.rotation)
+
+
+@pytest.mark.parametrize("q", [np.zeros(N - 1), np.zeros((N, 1)), [0.0] * (N + 1), None, "home", 0.0])
+@pytest.mark.parametrize("ask", [MODEL.pose, MODEL.jacobian])
+def test_a_configuration_that_is_none_is_one_line(ask, q):
+    with pytest.raises(HandrailError, match=r"^configuration: expected [^\n]+, got [^\n]+$"):
+        ask(q)
+    np.testing.assert_array_equal(MODEL.jacobian([0] * N), MODEL.jacobian(np.zeros(N)))
 
 
 def test_channel_velocities_are_what_moves():

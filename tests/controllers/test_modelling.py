@@ -145,10 +145,11 @@ WRONG = {
         "expected in the order x, y, theta, lift",
     ),
     "pairs": (r"pairs = \[\n(?s:.*?)\n\]", "pairs = []", "left_fingers and right_fingers can meet"),
-    "fast": (
+    "fast": (r"velocity = \[1.0", "velocity = [9.0", "velocity of at most 1.5, got 9.0"),
+    "faster": (
         r"velocity = \[1.0, 1.0, 0.8, 0.1, 2.0",
-        "velocity = [1.0, 1.0, 0.8, 0.1, 9.0",
-        "velocity of at most 7.0",
+        "velocity = [1.0, 1.0, 0.8, 0.1, 3.0",
+        "velocity of at most 2, got 3.0",
     ),
     "urdf": (r'urdf = "two.urdf"', 'urdf = "two.toml"', "URDF"),
     "toml": (r"^name = ", "name ", "not valid TOML"),

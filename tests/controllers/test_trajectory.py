@@ -17,6 +17,16 @@ def stopping(velocities, elapsed=0.0):
     return Trajectory(np.vstack([velocities, np.zeros((1, 2))]), 0.1, elapsed)
 
 
+@pytest.mark.parametrize("dt", [0.0, -0.1, np.nan, np.inf])
+def test_time_between_knots_is_some(dt):
+    with pytest.raises(HandrailError, match="dt > 0"):
+        Trajectory(np.ones((2, 2)), dt)
+
+
+def test_after_all_time_it_is_at_rest():
+    np.testing.assert_array_equal(Trajectory(np.ones((2, 2)), 0.1).velocity(np.inf), np.zeros(2))
+
+
 @given(KNOTS, PERIODS, st.floats(0, 1))
 def test_what_is_left_is_the_same_curve(velocities, periods, ahead):
     whole = left = stopping(velocities)
