@@ -21,6 +21,8 @@ def kind(rollout):
     """Return `none`, `on the way`, or `lost`: of the first contact."""
     if not rollout["contacts"]:
         return "none"
+    if not {"distances", "first_contact"} <= rollout.keys():
+        sys.exit("expected rollouts that say `distances` and `first_contact`, got others: of an older study")
     distances = np.array(rollout["distances"][: int(rollout["first_contact"]) + 1])
     recent = distances[-WINDOW - 1 :]
     if len(recent) <= WINDOW or np.diff(recent).max() > JUMP or recent[0] - recent[-1] >= PROGRESS:

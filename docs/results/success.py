@@ -75,6 +75,6 @@ def main(figure, *archives):
 
 if missing := [name for name in sys.argv[2:] if not Path(name).is_file()]:
     sys.exit(f"expected files, got {', '.join(missing)}")
-if len(sys.argv) < 3:
+if len(sys.argv) < 3 or not sys.argv[1].endswith(".png"):
     sys.exit("expected FIGURE.png ARCHIVE.tar.xz …")
 main(*sys.argv[1:])

@@ -142,3 +142,20 @@ def test_a_contact_after_the_hand_got_nearer_no_more_is_told_apart(tmp_path):
     assert said_by(RESULTS / "contacts.py", tmp_path / "study.tar.xz") == (
         "reach, ee: of 6 rollouts 5 touched something, 3 on the way, 2 after they were lost; 1 succeeded\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        (("contacts.py", RESULTS / "teleop_modes_factors.tar.xz"), "expected rollouts that say `distances`"),
+        (("success.py", *[RESULTS / "teleop_modes_factors.tar.xz"] * 2), "expected FIGURE.png"),
+    ],
+)
+def test_what_a_script_cannot_use_is_one_line(script, told):
+    name, *files = script
+    done = subprocess.run(
+        [sys.executable, RESULTS / name, *files], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith(told)
+    assert len(done.stderr.splitlines()) == 1
