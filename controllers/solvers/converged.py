@@ -216,8 +216,10 @@ class ConvergedSolver:
                 ),
             )
         except RuntimeError as error:
+            if interrupted():  # CasADi may say so itself
+                raise KeyboardInterrupt from error
             raise HandrailError(f"converged solver: CasADi failed: {message_of(error)}") from error
-        if interrupted():  # CasADi only warns of it
+        if interrupted():  # or only warns of it
             raise KeyboardInterrupt
         change, stats = np.array(found["x"]).ravel()[: u.size], solver.stats()
         moved = np.array(found["g"]).ravel()[2 * len(upper) :][: u.size].reshape(u.shape)

@@ -1,5 +1,6 @@
 """The converged solver's laws: it minimises the very problem that the real-time solver steps on."""
 
+import contextlib
 import gc
 import os
 import signal
@@ -174,6 +175,23 @@ def test_an_interrupt_is_heard_though_casadi_takes_it(capfd):
     for delay in rng.uniform(0.0, 0.05, 20):
         with pytest.raises(KeyboardInterrupt):
             solved_until_interrupted(delay)
+
+
+def test_an_interrupt_that_casadi_raises_is_no_failed_solution(monkeypatch):
+    """Law: on SIGTERM CasADi may raise an error of its own (1 of 400 times): an interrupt, no failure."""
+
+    def interrupted(**_):
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        raise RuntimeError("function.cpp:514: KeyboardInterrupt")
+
+    monkeypatch.setattr("handrail.controllers.solvers.converged._program", lambda *_: interrupted)
+    mpc = MaskedMpc(ALONE)
+    problem = mpc.build_problem(
+        State(DESCRIPTION.home, np.zeros(9)), random_intent(mpc, np.random.default_rng(0))
+    )
+    with Interrupts(), pytest.raises(KeyboardInterrupt):
+        solver(mpc).solve(problem, np.zeros((10, 9)))
 
 
 @dataclass(frozen=True)
