@@ -7,6 +7,7 @@ import signal
 import threading
 from dataclasses import dataclass, replace
 
+import casadi
 import numpy as np
 import pytest
 from ideal_robot import without_shapes
@@ -185,7 +186,7 @@ def test_an_interrupt_that_casadi_raises_is_no_failed_solution(monkeypatch):
             signal.raise_signal(signal.SIGTERM)
         raise RuntimeError("function.cpp:514: KeyboardInterrupt")
 
-    monkeypatch.setattr("handrail.controllers.solvers.converged._program", lambda *_: interrupted)
+    monkeypatch.setattr(casadi, "nlpsol", lambda *_: interrupted)
     mpc = MaskedMpc(ALONE)
     problem = mpc.build_problem(
         State(DESCRIPTION.home, np.zeros(9)), random_intent(mpc, np.random.default_rng(0))
