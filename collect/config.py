@@ -260,7 +260,7 @@ class RecordConfig(SessionConfig, PolicyConfig, ExecutionConfig):
     def _check_rates(self) -> None:
         fps = self.dataset.fps
         robot = self.robot_fps or fps
-        if robot % fps or robot > FPS_RANGE[1]:
+        if robot % fps or not fps <= robot <= FPS_RANGE[1]:
             raise HandrailError(
                 f"--robot_fps {robot}: expected a multiple of --dataset.fps {fps}, at most {FPS_RANGE[1]}"
             )
@@ -291,8 +291,8 @@ class DriveConfig(RecordConfig):
     ray: tyro.conf.Suppress[str] = field(default="", kw_only=True)
 
 
-def check_fps(fps: int) -> None:
+def check_fps(fps: int, flag: str = "--dataset.fps") -> None:
     """Check a control and recording rate [Hz]."""
     low, high = FPS_RANGE
     if not low <= fps <= high:
-        raise HandrailError(f"--dataset.fps {fps}: expected {low} to {high}")
+        raise HandrailError(f"{flag} {fps}: expected {low} to {high}")

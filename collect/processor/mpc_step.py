@@ -82,7 +82,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
     the obstacles. Where input is stale, malformed, not finite or from the future, it brakes, and counts.
     """
 
-    robot: str = "ridgeback_ur10"
+    robot: Annotated[str, Meta()] = "ridgeback_ur10"
     """Its name, or its description (.toml)."""
     units: str | dict[str, Any] = "plain"
     """Its names and units: plain, those of a robot of LeRobot's, or a table (docs/processor.md)."""
