@@ -49,10 +49,8 @@ class PartialIntent:
         self._scaled = {name: (index, 1.0) for index, name in enumerate(channels.names)}
         if units.base:
             self._scaled |= zip(units.base.twist, enumerate(units.base.scale), strict=True)
-        self._first_arm = channels.joint_slice.start + len(channels.base)
-        arm = zip(
-            units.action_names, enumerate(units.scale, self._first_arm), units.sends_position, strict=False
-        )
+        self._first_arm = first = channels.joint_slice.start + len(channels.base)
+        arm = zip(units.action_names, enumerate(units.scale, first), units.sends_position, strict=False)
         self._scaled |= {name: term for name, term, is_position in arm if not is_position}
         for name, (channel, scale) in inputs.items():
             if channel not in channels.names:

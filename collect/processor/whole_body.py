@@ -170,6 +170,7 @@ class WholeBody:
         if before is None:
             self.targets = reading.arm.copy()
             self._grips = 1.0 - reading.openings
+            self._gate.grippers = tuple(self._grips.tolist())
         elif reading.pose is None:
             passed = _passed(self._heard, now, self._timeout)
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)

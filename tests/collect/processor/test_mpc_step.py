@@ -181,6 +181,28 @@ def test_a_gripper_that_nobody_moves_stays_as_it_was(action, level):
     assert not drive.step.counts
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"ee.vx": math.nan}, {"ee.typo": 0.0}, {"gripper": math.nan}, {"time": 0.0}]
+)
+def test_a_gripper_stays_as_it_was_where_the_first_thing_said_brakes(wrong):
+    drive = Drive()
+    for level in (0.6, 1.0):
+        drive.robot.grips[:] = level
+        drive.pipeline.reset()
+        assert drive.go(AHEAD | wrong, 0.5)["gripper.pos"] == pytest.approx(level)
+        assert drive.go(AHEAD, 0.5)["gripper.pos"] == pytest.approx(level)
+    assert sum(drive.step.counts.values()) == 30
+
+
+def test_a_gripper_moves_where_the_robot_begins_too_near_to_something_to_move():
+    below = (Drive().hand - [0.0, 0.0, 0.05]).tolist()
+    drive = Drive(obstacles=[{"name": "wall", "kind": "box", "size": [0.2, 0.2, 0.2], "position": below}])
+    drive.go(AHEAD | {"gripper": 1.0}, 6 * PERIOD)
+    assert drive.step.counts == {"backup": 6}
+    assert drive.sent[-1]["gripper.pos"] == pytest.approx(6 * drive.sent[0]["gripper.pos"])
+    assert drive.sent[0]["gripper.pos"] > 0.0
+
+
 @pytest.mark.parametrize("name", ["x.vel", "time", "gripper", "gripper.pos", "elbow_joint.pos", "ee.vy"])
 def test_an_input_means_what_is_said_of_it_whatever_else_has_its_name(name):
     drive, plain = (Drive(inputs={each: ["ee.vx", 0.2]}) for each in (name, "delta_x"))
