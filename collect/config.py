@@ -258,15 +258,15 @@ class RecordConfig(SessionConfig, PolicyConfig, ExecutionConfig):
             raise HandrailError(f"{flag}: expected a recording without {alone}, which is of one process")
 
     def _check_rates(self) -> None:
-        fps = self.dataset.fps
+        fps, control, (low, high) = self.dataset.fps, self.control_fps, FPS_RANGE
         robot = self.robot_fps or fps
-        if robot % fps or robot > FPS_RANGE[1]:
+        if robot % fps or not fps <= robot <= high:
             raise HandrailError(
-                f"--robot_fps {robot}: expected a multiple of --dataset.fps {fps}, at most {FPS_RANGE[1]}"
+                f"--robot_fps {robot}: expected a multiple of --dataset.fps {fps}, at most {high}"
             )
-        if self.control_fps and (self.control_fps < 1 or robot % self.control_fps):  # else updates come late
+        if control and (control < low or robot % control):  # else updates come late
             raise HandrailError(
-                f"--control_fps {self.control_fps}: expected a divisor of the robot's rate {robot}"
+                f"--control_fps {control}: expected a divisor of the robot's rate {robot}, at least {low}"
             )
 
 
@@ -291,8 +291,8 @@ class DriveConfig(RecordConfig):
     ray: tyro.conf.Suppress[str] = field(default="", kw_only=True)
 
 
-def check_fps(fps: int) -> None:
+def check_fps(fps: int, flag: str = "--dataset.fps") -> None:
     """Check a control and recording rate [Hz]."""
     low, high = FPS_RANGE
     if not low <= fps <= high:
-        raise HandrailError(f"--dataset.fps {fps}: expected {low} to {high}")
+        raise HandrailError(f"{flag} {fps}: expected {low} to {high}")

@@ -34,7 +34,7 @@ class SimulatedConfig:
 
     def _session(self, **more: Any) -> SessionConfig:
         """Return the settings of the session, checked."""
-        check_fps(self.fps)
+        check_fps(self.fps, "fps")
         config = SessionConfig(
             task=self.task,
             robot=self.robot,

@@ -54,7 +54,7 @@ class ModeAction:
         A gripper beyond a half closes.
         """
         numbers, values = np.asarray(numbers, float), np.zeros(self._channels.size)
-        values[self._owned] = numbers[: len(self._owned)]
+        values[self._owned] = numbers[: len(self._owned)] if np.isfinite(numbers).all() else np.nan
         focus, grippers = numbers[len(self._owned)], numbers[-len(self._grippers) :]
         mask = self._base if self._mode.by_focus and not focus <= _HALF else self._hand
         return Intent(values, mask, tuple(map(decided_gripper, grippers)), self._mode.name, time)

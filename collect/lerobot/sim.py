@@ -254,7 +254,7 @@ class HandrailSim(Uncalibrated, Robot):
         """Return the robot, the scene, what was sent in the last period, and how the controller fared.
 
         The mode is its place in the list of modes, −1 for a mask of one's own; the status that of `Status`;
-        the distance the smallest one now, cut to 10 m.
+        the distance the smallest one that the controller has measured, cut to 10 m; 10 before it has.
         """
         now, modes = self.loop.now, list(MODES)
         numbers = [*now.observation["agent_pos"], *now.observation["environment_state"]]

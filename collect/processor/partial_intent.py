@@ -13,8 +13,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 
-_STAYS = -1.0
-_ACTIONS = {0.0: 1.0, 1.0: _STAYS, 2.0: 0.0}  # LeRobot's gripper actions: close, stay, open
+_ACTIONS = {0.0: 1.0, 1.0: None, 2.0: 0.0}  # LeRobot's gripper actions: close, stay, open
 _FOLLOW = 4.0  # of a joint towards the position that is asked for [1/s]
 
 
@@ -23,8 +22,9 @@ class PartialIntent:
 
     An entry is one of
     - a channel (`ee.vx`, `base.wz`, `joint.elbow_flex`), in m/s and rad/s;
-    - a name of `inputs`: so many times a channel;
-    - an entry of the robot's own action: a leader's joint, which is followed, or the base's velocity;
+    - a name of `inputs`: so many times a channel, whatever else the name means;
+    - an entry of the robot's own action: a leader's joint, which is followed, or a velocity of a joint that
+      takes one or of the base;
     - `gripper`, of several hands `left.gripper`: 0 open to 1 closed, or LeRobot's action: 0 closes, 1 leaves
       it, 2 opens;
     - `time`, when it was asked, on the clock of the step [s].
@@ -47,13 +47,15 @@ class PartialIntent:
     ) -> None:
         self._channels, self._units, self._frames, self._actions = channels, units, frames, actions
         self._scaled = {name: (index, 1.0) for index, name in enumerate(channels.names)}
+        if units.base:
+            self._scaled |= zip(units.base.twist, enumerate(units.base.scale), strict=True)
+        self._first_arm = first = channels.joint_slice.start + len(channels.base)
+        arm = zip(units.action_names, enumerate(units.scale, first), units.sends_position, strict=False)
+        self._scaled |= {name: term for name, term, is_position in arm if not is_position}
         for name, (channel, scale) in inputs.items():
             if channel not in channels.names:
                 raise unknown_name(f"channel of input {name}:", channel, channels.names)
             self._scaled[name] = (channels.names.index(channel), scale)
-        if units.base:
-            self._scaled |= zip(units.base.twist, enumerate(units.base.scale), strict=True)
-        self._first_arm = channels.joint_slice.start + len(channels.base)
         own = enumerate(units.grippers)
         self._of_robot = {gripper.name: (hand, gripper) for hand, gripper in own if gripper}
         self.reset()
@@ -75,19 +77,19 @@ class PartialIntent:
         entries = action if isinstance(action, Mapping) else {"": math.nan}
         units, stamp = self._units, now
         pairs = zip(self._grips, openings, strict=True)
-        grips = [float(opening < 0.5) if grip is None else grip for grip, opening in pairs]
+        grips = [1.0 - opening if grip is None else grip for grip, opening in pairs]
         for name in entries:
             value = number(entries, name)
-            if name == "time":
+            if name in self._scaled:
+                index, scale = self._scaled[name]
+                values[index] += scale * value
+                mask[index] = True
+            elif name == "time":
                 stamp = value
             elif name in self._channels.grippers:
                 hand = self._channels.grippers.index(name)
                 grip = _ACTIONS.get(value, math.nan) if self._actions else value
-                grips[hand] = (self._grips[hand] or 0.0) if grip == _STAYS else grip
-            elif name in self._scaled:
-                index, scale = self._scaled[name]
-                values[index] += scale * value
-                mask[index] = True
+                grips[hand] = grips[hand] if grip is None else grip
             elif name in units.positions:
                 joint = units.positions.index(name)
                 wanted = units.joint_positions(np.where(np.arange(len(targets)) == joint, value, 0.0))

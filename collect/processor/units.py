@@ -7,6 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from handrail.collect.flags import check_names
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.channels import Channels
@@ -127,6 +128,7 @@ class RobotUnits:
         action_names: of the action's entries, in order.
         observation_names: of the numbers that an observation has to have.
         sends_position: which joints of the arm are sent positions, (n − b,).
+        scale: of the arm's units, with their signs [rad, m], (n − b,).
     """
 
     def __init__(self, description: RobotDescription, table: UnitsTable) -> None:
@@ -146,7 +148,7 @@ class RobotUnits:
         joints = [table.joints[name] for name in arm]
         ends = zip(joints, limits.position_lower[b:], limits.position_upper[b:], strict=True)
         terms = [joint.terms(lower, upper) for joint, lower, upper in ends]
-        self._scale, self._centre = np.array(terms).reshape(-1, 2).T
+        self.scale, self._centre = np.array(terms).reshape(-1, 2).T
         self._zero = np.array([joint.zero for joint in joints])
         self.sends_position = np.array([joint.sends == "position" for joint in joints], dtype=bool)
         self.positions = tuple(joint.name + POSITION for joint in joints)
@@ -155,6 +157,8 @@ class RobotUnits:
         twist = self.base.twist if self.base else ()
         self.action_names = (*sent, *grip, *twist)
         self.observation_names = (*self.positions, *grip, *(self.base.pose or twist if self.base else ()))
+        for names in (self.action_names, self.observation_names):
+            check_names("name", f"units of robot {description.name}", names, names)
 
     def read(self, observation: Any) -> BodyReading | None:
         """Return what an observation says; None where a number is missing or not finite."""
@@ -181,7 +185,7 @@ class RobotUnits:
             twist: of the base in its own frame [m/s, rad/s], (3,).
             grippers: of each hand, 0 open, 1 closed, (h,).
         """
-        values = np.where(self.sends_position, (q - self._centre) / self._scale + self._zero, v / self._scale)
+        values = np.where(self.sends_position, (q - self._centre) / self.scale + self._zero, v / self.scale)
         numbers = values.tolist()
         for each, closed in zip(self.grippers, grippers, strict=True):
             numbers += [each.opened + closed * (each.closed - each.opened)] if each else []
@@ -191,7 +195,7 @@ class RobotUnits:
 
     def joint_positions(self, values: FloatArray) -> FloatArray:
         """Return the arm's joints from the robot's values, (n − b,) [m, rad]."""
-        return self._centre + self._scale * (values - self._zero)
+        return self._centre + self.scale * (values - self._zero)
 
 
 def number(values: Any, name: str) -> float:

@@ -53,7 +53,7 @@ class WholeBody:
 
     Attributes:
         trouble: what is wrong with the observation now; empty if nothing is.
-        targets: where the arm's joints are sent, (n − b,) [rad, m].
+        targets: where the arm's joints are sent, (n − b,) [rad, m]; one that takes a velocity, where it is.
         sent: the command sent last, inside the limits, (n + h,).
     """
 
@@ -122,8 +122,8 @@ class WholeBody:
         if math.isfinite(now):
             self._time = now
         v = np.where(self._held, 0.0, self.velocity)
-        arm = np.where(self._units.sends_position, self.targets, self._reading.arm)
-        expected = np.append(self._expected()[: self._b], arm)
+        self.targets = np.where(self._units.sends_position, self.targets, self._reading.arm)
+        expected = np.append(self._expected()[: self._b], self.targets)
         return State(np.append(self._now(), self._reading.arm), v, now, self.velocity, expected)
 
     def send(self, command: ArrayLike) -> dict[str, float]:
@@ -170,6 +170,7 @@ class WholeBody:
         if before is None:
             self.targets = reading.arm.copy()
             self._grips = 1.0 - reading.openings
+            self._gate.grippers = tuple(self._grips.tolist())
         elif reading.pose is None:
             passed = _passed(self._heard, now, self._timeout)
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)

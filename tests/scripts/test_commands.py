@@ -44,6 +44,14 @@ WRONG = {
     "camera": (["--cameras", "wrist,roof"], "unknown camera 'roof'"),
     "mask size": (["--mask", "0101"], "expected 18 characters 0 or 1"),
     "fps 0": (["--dataset.fps", "0"], "--dataset.fps 0: expected 10 to 100"),
+    "robot back in time": (
+        ["--robot_fps", "-20"],
+        "--robot_fps -20: expected a multiple of --dataset.fps 20",
+    ),
+    "few updates": (
+        ["--mode", "direct", "--control_fps", "5"],
+        "divisor of the robot's rate 20, at least 10",
+    ),
     "late updates": (["--control_fps", "15"], "--control_fps 15: expected a divisor of the robot's rate 20"),
     "fps text": (["--dataset.fps", "fast"], "--dataset.fps"),
     "nan noise": (["--noise", "nan"], "--noise: expected a number >= 0.0, got nan"),

@@ -9,14 +9,16 @@ from lerobot_helpers import loop, steered
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot import HandrailScripted, HandrailScriptedConfig, HandrailSim, HandrailSimConfig
-from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT
+from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, ModeAction
 from handrail.collect.operators.modes import MODES
 from handrail.collect.seeds import evaluation_seed
 from handrail.collect.session.build import build_env
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.registry import fitting
+from handrail.controllers.robot.model import load_model
 
 
 @pytest.mark.parametrize(
@@ -102,6 +104,17 @@ def test_scenes_of_an_evaluation_are_those_of_handrail_evaluate(tmp_path):
         size = len(expected["agent_pos"])
         np.testing.assert_array_equal(shown[:size], expected["agent_pos"])
         np.testing.assert_array_equal(shown[size:][:7], expected["environment_state"])
+
+
+@pytest.mark.parametrize("mode", ["ee", "switching"])
+@pytest.mark.parametrize("focus", [0.0, 1.0])
+def test_no_number_of_an_action_may_be_none(mode, focus):
+    action = ModeAction(MODES.find(mode), Channels.of(load_model().description))
+    numbers = np.array([focus if name == "focus.pos" else 0.1 for name in action.names])
+    assert action.intent(numbers, 0.0).is_finite
+    for index in range(len(numbers)):
+        wrong = np.where(np.arange(len(numbers)) == index, np.nan, numbers)
+        assert not action.intent(wrong, 0.0).is_finite
 
 
 def test_what_is_no_command_brakes_and_is_counted(tmp_path):

@@ -152,6 +152,64 @@ def test_a_leaders_joints_and_the_base_s_keys_are_followed():
     assert drive.sent[-1]["g.pos"] == 0.0
 
 
+@pytest.mark.parametrize("unit", ["radians", "degrees"])
+def test_a_leader_is_followed_by_a_joint_that_takes_a_velocity_and_does_less(unit):
+    units, one = degrees(), {"radians": 1.0, "degrees": 180.0 / math.pi}[unit]
+    units["joints"] |= {"elbow_joint": {"name": "elbow", "unit": unit, "sends": "velocity", "sign": -1}}
+    drive, angle = Drive(units=units), -one
+    for _ in range(150):
+        seen = drive.robot.observation() | {"elbow.pos": angle}
+        angle += 0.7 * PERIOD * drive.pipeline(({"elbow.pos": -1.5 * one}, seen))["elbow.vel"]
+        drive.clock.now += PERIOD
+    assert angle == pytest.approx(-1.5 * one, rel=0.01)
+    for _ in range(30):
+        seen = drive.robot.observation() | {"elbow.pos": angle}
+        sent = drive.pipeline(({"elbow.vel": 0.2 * one}, seen))["elbow.vel"]
+        angle += PERIOD * sent
+        drive.clock.now += PERIOD
+    assert sent == pytest.approx(0.2 * one, rel=0.02)
+    assert not drive.step.counts
+
+
+@pytest.mark.parametrize("level", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("action", [{}, {"gripper": 1.0}], ids=["unnamed", "stay"])
+def test_a_gripper_that_nobody_moves_stays_as_it_was(action, level):
+    drive = Drive(gripper="actions")
+    drive.robot.grips[:] = level
+    drive.go(AHEAD | action, 0.5)
+    assert [sent["gripper.pos"] for sent in drive.sent] == pytest.approx([level] * len(drive.sent))
+    assert not drive.step.counts
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"ee.vx": math.nan}, {"ee.typo": 0.0}, {"gripper": math.nan}, {"time": 0.0}]
+)
+def test_a_gripper_stays_as_it_was_where_the_first_thing_said_brakes(wrong):
+    drive = Drive()
+    for level in (0.6, 1.0):
+        drive.robot.grips[:] = level
+        drive.pipeline.reset()
+        assert drive.go(AHEAD | wrong, 0.5)["gripper.pos"] == pytest.approx(level)
+        assert drive.go(AHEAD, 0.5)["gripper.pos"] == pytest.approx(level)
+    assert sum(drive.step.counts.values()) == 30
+
+
+def test_a_gripper_moves_where_the_robot_begins_too_near_to_something_to_move():
+    below = (Drive().hand - [0.0, 0.0, 0.05]).tolist()
+    drive = Drive(obstacles=[{"name": "wall", "kind": "box", "size": [0.2, 0.2, 0.2], "position": below}])
+    drive.go(AHEAD | {"gripper": 1.0}, 6 * PERIOD)
+    assert drive.step.counts == {"backup": 6}
+    assert drive.sent[-1]["gripper.pos"] == pytest.approx(6 * drive.sent[0]["gripper.pos"])
+    assert drive.sent[0]["gripper.pos"] > 0.0
+
+
+@pytest.mark.parametrize("name", ["x.vel", "time", "gripper", "gripper.pos", "elbow_joint.pos", "ee.vy"])
+def test_an_input_means_what_is_said_of_it_whatever_else_has_its_name(name):
+    drive, plain = (Drive(inputs={each: ["ee.vx", 0.2]}) for each in (name, "delta_x"))
+    assert drive.go({name: 1.0}, 0.5) == plain.go({"delta_x": 1.0}, 0.5)
+    assert not drive.step.counts
+
+
 def test_odometry_follows_a_circle():
     pose = np.zeros(3)
     for _ in range(600):
@@ -203,6 +261,10 @@ def test_it_says_the_robot_s_own_action():
         ({"settings": 3}, "settings: expected a table"),
         ({"units": {"joints": {}, "gripper": {"name": "g", "opened": 1, "closed": 1}}}, "to differ"),
         ({"tool_frame": "moon"}, "tool_frame"),
+        ({"robot": []}, "robot: expected a text"),
+        ({"units": degrees(gripper={"name": "arm_0.pos", "opened": 1, "closed": 0})}, "each name once"),
+        ({"units": degrees(base={"x": "x.vel", "y": "x.vel"})}, "each name once"),
+        ({"units": degrees(base={"pose": ["x.pos", "y.pos", "arm_0.pos"]})}, "each name once"),
     ],
 )
 def test_wrong_settings_are_named(setting, words):
