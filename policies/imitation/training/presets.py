@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
 
 
-_REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError, KeyError, SafetensorError)
+_REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError, LookupError, SafetensorError)
 _SINCE = {"corrections": "all", "init": ""}  # settings of which older checkpoints do not say, and did so
 _ENSEMBLE = "temporal_ensemble_coeff"
 ACT_CPU: dict[str, Any] = {

@@ -51,7 +51,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
         quiet: show no progress.
     """
     config.check()
-    lock = beside(config.folder.resolve(), "lock"), "trainings in", "handrail-train"
+    lock = beside(Path(os.path.realpath(config.folder)), "lock"), "trainings in", "handrail-train"
     with in_one_line(config), DatasetLock(*lock) if _MAIN else nullcontext():
         checkpoint = _begin(config)
         earlier = earlier_policy(config) if config.init and not checkpoint else None

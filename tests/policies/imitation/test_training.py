@@ -218,6 +218,8 @@ def test_a_link_to_a_folder_is_a_folder(recorded, tmp_path):
         train(tiny(recorded, tmp_path / "policy", steps=1, overwrite=overwrite), quiet=True)
     assert load_policy(tmp_path / "elsewhere").meta.steps == 1
     assert (tmp_path / "policy").is_symlink()
+    (tmp_path / "loop").symlink_to("loop")
+    refused(tiny(recorded, tmp_path / "loop"), "^training in .*loop")
 
 
 def test_weights_that_are_no_numbers_are_not_written(recorded, tmp_path):
