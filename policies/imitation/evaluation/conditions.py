@@ -118,15 +118,15 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     path, step = place / _TRAINED, place.parent.name
     content = load_json(path, "settings of LeRobot") if path.is_file() else {}
     training = check(content, _Trained, repr(str(path)))
-    root, task, robot = Path((training.get("dataset") or {}).get("root") or place), "", ""
+    root, said, fps = Path((training.get("dataset") or {}).get("root") or place), ("", "", ""), config.fps
     with suppress(HandrailError, OSError):  # it need not be here
-        task, _, robot = origin_of(read_info(root), read_episodes(root))
+        said, fps = origin_of(info := read_info(root), read_episodes(root)), info.fps
     return PolicyMeta(
         interface=None,
-        environment=task,
+        environment=said[0],
         mode=config.mode,
-        robot=robot,
-        fps=config.fps,
+        robot=said[2],
+        fps=fps,
         actions="intent" if config.mode else "recorded",
         training_seed=training.get("seed") or 0,
         dataset_draw=0,

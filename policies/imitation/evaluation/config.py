@@ -51,7 +51,7 @@ class EvaluateConfig(ExecutionConfig):
     hand: Advanced[str] = ""
     """Which hand does the task, of a robot with several; that of the demonstrations by default."""
     fps: Advanced[Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])]] = 20
-    """Decisions a second of such policies: the rate of their dataset [Hz]."""
+    """Decisions a second of such policies: the rate of their dataset, where that is not there [Hz]."""
     time_limit: Advanced[Annotated[float, Meta(ge=0, le=MOST_TIME)]] = 0.0
     """Time after which a rollout is given up [s]; when 0, that of the demonstrations, or the task's own."""
     video: str = ""

@@ -9,6 +9,7 @@ A checkpoint appears under its name only when it is whole.
 import itertools
 import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -62,7 +63,7 @@ class PolicyMeta:
     """Their teleop mode; "mixed" if there were several, "" if they do not say."""
     robot: RobotName
     """Their robot."""
-    fps: Fps
+    fps: Annotated[int, Meta(ge=1, le=1000)]
     """Decisions a second [Hz]."""
     actions: Literal["realised", "intent", "recorded"]
     training_seed: Count
@@ -81,9 +82,9 @@ class PolicyMeta:
     """Of the software."""
     sizes: TrainingSizes = field(default_factory=TrainingSizes)
     episodes: tuple[Count, ...] = ()
-    """Numbers of the episodes that it learnt from, in order."""
+    """Numbers of its episodes, in order, those that were held out among them."""
     data: Name = ""
-    """Digest of what it learnt from."""
+    """Digest of these."""
     time_limit: Annotated[float, Meta(ge=0, le=MOST_TIME)] = 0.0
     """That its episodes had at most [s]; 0 if that was the task's own, or they do not say."""
     cameras: Mapping[Name, tuple[Count, Count]] = field(default_factory=dict)
@@ -107,7 +108,7 @@ def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> tuple[str
     found = [{str(row.get(name) or "") for row in rows} for name in ("environment", "mode", "robot")]
     task, mode, robot = (each.pop() if len(each) == 1 else MIXED for each in found)
     is_name = robot and "/" not in robot and not robot.endswith(".toml")
-    return task, mode, robot if is_name else info.robot_type
+    return task, mode, robot if is_name else re.sub(r"[^\w+:,.\- ]", "-", info.robot_type)
 
 
 def read_meta(folder: Path) -> PolicyMeta:

@@ -82,7 +82,9 @@ class TrainedPolicy:
             return self.after(torch.cat(rows)).cpu().numpy() if rows else np.zeros((0, 0), np.float32)
 
     def skip(self, count: int) -> None:
-        """Leave out so many planned actions: their time is over."""
+        """Leave out so many planned actions: their time is over; an average over plans begins anew."""
+        if ensembler := getattr(self.policy, "temporal_ensembler", None):
+            ensembler.reset()
         for _ in range(min(count, len(self._queue))):
             self._queue.popleft()
 

@@ -25,7 +25,7 @@ def earlier_policy(config: TrainConfig) -> tuple[Path, PolicyMeta]:
     return place, earlier
 
 
-def same_interface(init: str, earlier: PolicyMeta, interface: PolicyInterface, fps: float) -> PolicyInterface:
+def same_interface(init: str, earlier: PolicyMeta, interface: PolicyInterface) -> PolicyInterface:
     """Return the interface of the policy that a training begins with, once it is the dataset's.
 
     It may have more masks than the dataset, none fewer: what nobody owns is no mask to learn.
@@ -33,8 +33,6 @@ def same_interface(init: str, earlier: PolicyMeta, interface: PolicyInterface, f
     known = earlier.interface
     assert known is not None
     refused = f"--init {init}: expected a policy of the dataset's"
-    if earlier.fps != fps:
-        raise HandrailError(f"{refused} rate, {fps} Hz, got {earlier.fps} Hz")
     for name in ("state_names", "environment_names", "channels", "base_pose"):
         if getattr(known, name) != getattr(interface, name):
             raise HandrailError(f"{refused} {name.replace('_', ' ')}, got {shown(getattr(known, name))}")

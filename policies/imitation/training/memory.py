@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.schema import Feature
+from handrail.datasets.format.schema import POLICY_PREFIXES, Feature
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.policies.imitation.interface.interface import ACTION
 from handrail.policies.imitation.training.corrections import Draws
@@ -103,6 +103,15 @@ class MemoryDataset:
                 batch[key] = values[rows]
         batch["task"] = [self.tasks[episode] for episode in episodes.tolist()]
         return batch
+
+
+def check_finite(where: str, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, np.ndarray]) -> None:
+    """Check that what a policy reads and writes are numbers; `rows` are the episodes' lines of metadata."""
+    for key, values in columns.items():
+        wrong = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
+        if key.startswith(POLICY_PREFIXES) and wrong.any():
+            episode = rows[columns["episode_index"][wrong.argmax()]]["episode_index"]
+            raise HandrailError(f"{where}: expected finite numbers, got others in {key} of episode {episode}")
 
 
 def pictured(info: DatasetInfo) -> dict[str, Feature]:

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
+from safetensors import SafetensorError
+
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.datasets.storage.strict_json import parse_json
 from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
 
 
-_REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
+_REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError, LookupError, SafetensorError)
 _SINCE = {"corrections": "all", "init": ""}  # settings of which older checkpoints do not say, and did so
 _ENSEMBLE = "temporal_ensemble_coeff"
 ACT_CPU: dict[str, Any] = {

@@ -204,6 +204,7 @@ class TrainingRun:
         completion = Completion(meta.robot, meta.environment, meta.mode, meta.fps, meta.hand)
         around = with_steps(self._before, self._after, meta.interface, completion, self._encoder)
         policy, sizes = self._accelerator.unwrap_model(self._policy), self._settings.batch_size
+        check_numbers(policy, (), folder)
         parts = (policy, self._optimizer, self._schedule, *around)
         save_checkpoint(draft, meta.steps, self._settings, *parts, self._accelerator.num_processes, sizes)
         write_sums(draft, means.metrics)

@@ -12,7 +12,7 @@ import torch
 from handrail.collect.operators.modes import MODES
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import data_files
-from handrail.datasets.format.schema import Feature
+from handrail.datasets.format.schema import POLICY_PREFIXES, Feature
 from handrail.datasets.format.stats import column_stats
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.digest import digest_of_pictures
@@ -35,6 +35,7 @@ from handrail.policies.imitation.training.memory import (
     PICTURES,
     MemoryDataset,
     MemoryMeta,
+    check_finite,
     open_pictures,
     picture_stats,
     pictured,
@@ -48,7 +49,6 @@ Columns = dict[str, np.ndarray]
 Features = dict[str, Feature]
 _LEARNT = ("observation", "action", "next.")
 _CORRECTED = "corrected"  # a column of whether a frame counts as a correction
-_NORMALISED = ("observation", "action")  # LeRobot rounds their statistics to the type that they come in
 _READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
 _READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
 _FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
@@ -141,9 +141,10 @@ def read_source(
         began: what the checkpoint says that the training goes on from.
         earlier: what the policy says whose weights it began with.
     """
-    root = config.dataset.folder
-    check_whole(root, config.verify)
+    check_whole(root := config.dataset.folder, config.verify)
     info = read_info(root)
+    if earlier and earlier.fps != info.fps:
+        raise HandrailError(f"--init {config.init}: expected a policy of {info.fps} Hz, got {earlier.fps} Hz")
     rows = with_success(info, read_episodes(root))
     selection = select_again(rows, began) if began else select(rows, info.fps, config)
     encoder = find_encoder(config.encoder) if config.encoder else None
@@ -161,6 +162,7 @@ def read_source(
     if config.corrections != "all":
         columns[_CORRECTED] = corrected(config.corrections, info, partial(_episodes, info, selection))
     columns |= _counters(selection.rows, info.fps)
+    check_finite(f"dataset {str(root)!r}", selection.rows, columns)
     source = TrainingSource(config, info, selection, interface, features, encoder, columns)
     if began is not None and source.digest != began.data:
         count = began.trained_on.get("episodes", 0)
@@ -202,7 +204,7 @@ def _interpreted(
     masks = _episodes(info, selection, [MASK])
     interface = PolicyInterface.of_dataset(features, masks, actions, config.base_pose)
     if earlier:
-        interface = same_interface(config.init, earlier, interface, info.fps)
+        interface = same_interface(config.init, earlier, interface)
 
     def learnt(episode: Columns) -> Columns:
         state, environment = interface.observe(episode[STATE], episode[ENVIRONMENT])
@@ -249,8 +251,8 @@ def _recorded(info: DatasetInfo, selection: Selection, config: TrainConfig) -> t
         raise HandrailError(f"{where}: expected a column 'action', got {', '.join(features) or 'none'}")
     columns = _joined(_episodes(info, selection, list(features)))
     for key, values in columns.items():
-        if values.dtype == np.float64 or key.startswith(_NORMALISED):
-            columns[key] = values.astype(np.float32)
+        if values.dtype == np.float64 or key.startswith(POLICY_PREFIXES):
+            columns[key] = values.astype(np.float32)  # LeRobot rounds their statistics to this type too
     if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or cameras):
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
     numbers, needed = [key for key in features if key.startswith("observation")], ""

@@ -2,9 +2,8 @@
 
 import logging
 import os
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,10 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_task
 from handrail.collect.session.recorded import COLUMN, recorded_settings
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import decoded
 from handrail.controllers.versions import TRAINING, versions
+from handrail.datasets.storage.atomic import beside, remove
+from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
     MIXED,
@@ -31,15 +33,11 @@ from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
 from handrail.policies.imitation.training.earlier import earlier_policy
-from handrail.policies.imitation.training.presets import (
-    check_settings,
-    in_one_line,
-    policy_config,
-    resolved,
-)
+from handrail.policies.imitation.training.presets import check_settings, in_one_line, policy_config, resolved
 from handrail.policies.imitation.training.run import TrainingRun
 from handrail.policies.imitation.training.source import TrainingSource, read_source
 
+_MAIN = os.environ.get("RANK", "0") == "0"  # the one of several processes that makes room and writes
 _LOG_EVERY = 50  # updates
 _WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
 _OURS = {CURVE, f".{CURVE}.partial", "training.json", "checkpoints"}  # training.json: of an earlier version
@@ -53,25 +51,28 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
         quiet: show no progress.
     """
     config.check()
-    resumed = config.resume and last_checkpoint(config.folder)
-    earlier = earlier_policy(config) if config.init and not resumed else None
-    checkpoint = _begin(config)
-    began = None if checkpoint is None else _checked(config, checkpoint)
-    like = earlier[1] if earlier else began if config.init else None
-    source, steps = read_source(config, began, like), resolved(config).steps
-    losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
-    if checkpoint is None or int(checkpoint.name) < steps:
-        with threads(config.threads), _quiet(config), in_one_line(config):
-            settings = _settings(config, steps)
-            assert settings.policy is not None
-            learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
-            place = earlier and earlier[0]
-            training = TrainingRun(settings, learnt, checkpoint, source.encoder, place)
-            measured = out[0] if out else None, losses, config.eval_steps
-            training.train(lambda step: _meta(source, step, losses), *measured, quiet)
-        checkpoint = last_checkpoint(config.folder)
-    assert checkpoint is not None
-    return checkpoint / MODEL
+    lock = beside(Path(os.path.realpath(config.folder)), "lock"), "trainings in", "handrail-train"
+    with in_one_line(config), DatasetLock(*lock) if _MAIN else nullcontext():
+        checkpoint = _begin(config)
+        earlier = earlier_policy(config) if config.init and not checkpoint else None
+        began = None if checkpoint is None else _checked(config, checkpoint)
+        like = earlier[1] if earlier else began if config.init else None
+        source, steps = read_source(config, began, like), resolved(config).steps
+        losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
+        decoded(asdict(_meta(source, steps, losses)), PolicyMeta, f"dataset {str(source.info.root)!r}")
+        if checkpoint is None or int(checkpoint.name) < steps:
+            with threads(config.threads), _quiet(config):
+                settings = _settings(config, steps)
+                assert settings.policy is not None
+                learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
+                training = TrainingRun(settings, learnt, checkpoint, source.encoder, earlier and earlier[0])
+                for path in config.folder.glob("*") if config.overwrite and _MAIN else ():
+                    remove(path)  # not before all else is sure
+                measured = out[0] if out else None, losses, config.eval_steps
+                training.train(lambda step: _meta(source, step, losses), *measured, quiet)
+            checkpoint = last_checkpoint(config.folder)
+        assert checkpoint is not None
+        return checkpoint / MODEL
 
 
 def _checked(config: TrainConfig, checkpoint: Path) -> PolicyMeta:
@@ -105,13 +106,13 @@ def _settings(config: TrainConfig, steps: int) -> TrainPipelineConfig:
 
 
 def _begin(config: TrainConfig) -> Path | None:
-    """Make room for a training; return the checkpoint that it goes on from, if any."""
+    """Check that a training has room; return the checkpoint that it goes on from, if any."""
     folder, where = config.folder, f"--output {config.output}"
     if folder.exists() and not folder.is_dir():
         raise HandrailError(f"{where}: expected a folder, found a file")
     if config.resume:
         return last_checkpoint(folder)
-    if not folder.exists() or os.environ.get("RANK", "0") != "0":  # one of several processes makes room
+    if not folder.exists() or not _MAIN:
         return None
     kept = [path for path in (folder / "checkpoints").glob("*") if not _is_checkpoint(path)]
     others = [path for path in folder.iterdir() if path.name not in _OURS]
@@ -119,7 +120,6 @@ def _begin(config: TrainConfig) -> Path | None:
         raise HandrailError(f"{where}: expected a missing or empty folder, found {', '.join(foreign[:3])}")
     if any(folder.iterdir()) and not config.overwrite:
         raise HandrailError(f"{where}: there is a training already; say --resume or --overwrite")
-    shutil.rmtree(folder)
     return None
 
 
@@ -155,20 +155,17 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> Po
 
 def _recorded(rows: Sequence[Mapping[str, Any]]) -> list[SessionConfig]:
     """Return the settings of episodes, each once; none if one does not say."""
-    try:
+    with suppress(HandrailError):
         return [recorded_settings(row) for row in {str(row.get(COLUMN)): row for row in rows}.values()]
-    except HandrailError:
-        return []
+    return []
 
 
 def _time_limit(recorded: Sequence[SessionConfig]) -> float:
     """Return the longest time that episodes were given [s]; 0 for the task's own, or if one does not say."""
-    if not any(each.time_limit for each in recorded):
-        return 0.0
-    try:
-        return float(max(build_task(each).horizon for each in recorded))
-    except HandrailError:
-        return 0.0
+    with suppress(HandrailError):
+        if any(each.time_limit for each in recorded):
+            return float(max(build_task(each).horizon for each in recorded))
+    return 0.0
 
 
 @contextmanager

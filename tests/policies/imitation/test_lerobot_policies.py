@@ -101,6 +101,16 @@ def test_robot_and_task_are_said_by_the_dataset_of_the_training(plain, recorded)
         policy_conditions(config(plain, task="", robot=""))
 
 
+@pytest.mark.parametrize("fps", [10, 30])
+def test_the_rate_is_that_of_the_dataset_of_the_training(fps, plain, recorded, tmp_path):
+    root = shutil.copytree(recorded, tmp_path / "set")
+    path = root / "meta" / "info.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"fps": fps}))
+    (plain / "train_config.json").write_text(json.dumps({"dataset": {"root": str(root)}}))
+    (condition,), _ = policy_conditions(config(plain))
+    assert condition.checkpoint.meta.fps == fps
+
+
 def test_a_policy_may_see_pictures_instead_of_the_environment_s_state(plain):
     state = FEATURES["observation.state"]
     reads(plain, **{"observation.state": state, "observation.images.wrist": entry("VISUAL", 3, 64, 64)})

@@ -87,6 +87,20 @@ def test_a_training_that_is_interrupted_saves_a_checkpoint_and_goes_on_to_the_sa
     assert curves[0] == curves[1]
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("pretrained_model/model.safetensors", b"half"),
+        ("training_state/optimizer_state.safetensors", b"half"),
+        ("training_state/training_step.json", b"{}"),
+    ],
+)
+def test_a_damaged_checkpoint_is_one_line(name, content, trained, tmp_path):
+    config = cut(trained[1], tmp_path / "cut")
+    (config.folder / "checkpoints" / "000003" / name).write_bytes(content)
+    refused(config, "^policy act: ")
+
+
 def interrupted(at):
     """Return LeRobot's update, during one of which this process is told to end."""
     updates = itertools.count(1)

@@ -3,9 +3,11 @@
 import dataclasses
 import json
 import os
+import shutil
 import subprocess
 import sys
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trained import load_policy
-from handrail.policies.imitation.training import presets
+from handrail.policies.imitation.training import presets, run
 from handrail.policies.imitation.training.presets import policy_config
 from handrail.policies.imitation.training.source import read_source, steadied
 from handrail.policies.imitation.training.training import train
@@ -178,6 +180,70 @@ def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
         config = tiny(recorded, tmp_path / name.replace("/", "-"), overwrite=True)
         refused(config, f"missing or empty folder, found {name}")
         assert thesis.exists()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"dataset": StoredConfig(root="nowhere")}, "expected a folder"),
+        ({"policy_options": ("dim_model=130",)}, "^policy act: "),
+    ],
+)
+def test_what_is_there_is_not_removed_for_a_training_that_cannot_begin(wrong, said, trained, tmp_path):
+    folder, config = trained
+    config = dataclasses.replace(config, output=str(tmp_path / "policy"), steps=2, overwrite=True)
+    shutil.copytree(folder.parents[2], config.folder, symlinks=True)
+    refused(dataclasses.replace(config, **wrong), said)
+    assert weights(config.folder / "checkpoints" / "last" / "pretrained_model") == weights(folder)
+    assert os.listdir(train(config, quiet=True).parents[1]) == ["000002", "last"]
+
+
+def test_one_training_at_a_time_writes_a_folder(recorded, tmp_path):
+    config = tiny(recorded, tmp_path / "policy", steps=1)
+    others = [dataclasses.replace(config, **{flag: True}) for flag in ("resume", "overwrite")]
+
+    def update(*_):
+        for other in others:
+            refused(other, "by another handrail-train")
+
+    with mock.patch.object(run, "update_policy", update):
+        train(config, quiet=True)
+    assert os.listdir(tmp_path) == ["policy"]
+
+
+def test_a_link_to_a_folder_is_a_folder(recorded, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "policy").symlink_to("elsewhere")
+    for overwrite in (False, True):
+        train(tiny(recorded, tmp_path / "policy", steps=1, overwrite=overwrite), quiet=True)
+    assert load_policy(tmp_path / "elsewhere").meta.steps == 1
+    assert (tmp_path / "policy").is_symlink()
+    (tmp_path / "loop").symlink_to("loop")
+    refused(tiny(recorded, tmp_path / "loop"), "^training in .*loop")
+
+
+def test_weights_that_are_no_numbers_are_not_written(recorded, tmp_path):
+    config = tiny(recorded, tmp_path / "policy", lr=1e12)
+    refused(config, "expected finite weights")
+    assert not [path for path in (config.folder / "checkpoints").glob("*") if path.name.isdecimal()]
+
+
+def test_an_average_over_plans_begins_anew_where_nobody_asked(recorded, tmp_path):
+    """Law: after a gap nothing counts that was planned for moments of before."""
+    options = (*TINY, "n_action_steps=1", "temporal_ensemble_coeff=0.01")
+    policy = load_policy(
+        train(tiny(recorded, tmp_path / "policy", steps=1, policy_options=options), quiet=True)
+    )
+    seen, later = (
+        [np.full(len(names), at) for names in policy.meta.interface.observation_names] for at in (0, 1)
+    )
+    policy.reset()
+    alone = policy.act(*later)
+    policy.reset()
+    first = policy.act(*seen), policy.act(*later)
+    policy.skip(2)
+    np.testing.assert_array_equal(policy.act(*later), alone)
+    assert not np.array_equal(first[1], alone)
 
 
 def test_no_source_patches_another_library_s_names():

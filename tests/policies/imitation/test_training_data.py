@@ -2,8 +2,11 @@
 
 import itertools
 import json
+import shutil
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from canned import canned
 from training_helpers import FPS, TINY, refused, tiny, write_dataset
@@ -34,11 +37,11 @@ CASES = {
 }
 
 
-def write(root, keys, dtype="float32"):
+def write(root, keys, dtype="float32", fps=20, robot="so101"):
     """Write a dataset with these columns and nothing else, as any recorder might."""
     vector, camera = Feature(dtype, (2,), ("a.pos", "b.pos")), Feature("video", (32, 48, 3))
     features = {key: camera if key == PICTURES else vector for key in keys}
-    with EpisodeWriter.create(root, Manifest("any/body", 20, "so101", features)) as writer:
+    with EpisodeWriter.create(root, Manifest("any/body", fps, robot, features)) as writer:
         for index in range(12):
             frame = {key: np.full(2, index if dtype == "int64" else index / 12, dtype) for key in keys}
             frame |= {key: np.full((32, 48, 3), 20 * index, np.uint8) for key in keys if key == PICTURES}
@@ -57,6 +60,32 @@ def test_what_is_missing_is_said_in_one_line(case, tmp_path):
 
 def test_a_dataset_of_another_tool_needs_its_columns_as_they_are(tmp_path):
     refused(tiny(canned(write, (STATE, "action")), tmp_path / "policy"), "say --actions recorded")
+
+
+@pytest.mark.parametrize(("fps", "robot"), [(5, "SO-100 (follower)"), (120, "me/so100")])
+def test_whatever_its_rate_and_its_robot_s_name_a_policy_can_be_read_again(fps, robot, tmp_path):
+    root = canned(write, (STATE, "action"), fps=fps, robot=robot)
+    policy = train(tiny(root, tmp_path / "policy", steps=1, actions="recorded"), quiet=True)
+    assert read_meta(policy).fps == fps
+
+
+def test_a_policy_of_another_rate_is_no_beginning(tmp_path):
+    slow, fast = (canned(write, (STATE, "action"), fps=fps) for fps in (20, 50))
+    train(tiny(slow, tmp_path / "slow", steps=1, actions="recorded"), quiet=True)
+    config = tiny(fast, tmp_path / "fast", actions="recorded", init=str(tmp_path / "slow"))
+    refused(config, "--init .*: expected a policy of 50 Hz, got 20 Hz")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_no_number_is_not_learnt(value, tmp_path):
+    root = shutil.copytree(canned(write, (STATE, "action")), tmp_path / "set")
+    (file,) = root.glob("data/**/*.parquet")
+    table = pq.read_table(file)
+    actions = pa.array([[value, 0.0], *table["action"].to_pylist()[1:]], table["action"].type)
+    pq.write_table(table.set_column(table.column_names.index("action"), "action", actions), file)
+    (root / "meta" / "handrail.json").unlink()
+    config = tiny(root, tmp_path / "policy", actions="recorded")
+    refused(config, "expected finite numbers, got others in action of episode 0$")
 
 
 @pytest.mark.parametrize("policy", ["act", "diffusion"])
