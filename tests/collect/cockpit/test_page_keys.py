@@ -140,3 +140,67 @@ def test_a_card_says_the_keys_of_what_is_owned_as_they_are_now(on_bench, robot, 
     table = driver.page.locator("#study-keys")
     for row in (*rows, "F9 failed", "Enter start, pause, go on", "Space STOP"):
         expect(table).to_contain_text(row.replace(" ", "", 1))
+
+
+def test_a_finger_that_stays_while_the_page_is_away_moves_nothing_after(on_bench):
+    made, driver = on_bench(**PHONE)
+    driver.at("hint-close").tap()
+    driver.at("start").tap()
+    driver.expect_phase("recording")
+    touch = driver.page.context.new_cdp_session(driver.page)
+    thumb = middle(driver, '.stick[data-axes="left"]')
+    for event, deflected in ((None, True), ("blur", False), ("focus", False)):
+        if event:
+            driver.page.evaluate("(event) => dispatchEvent(new Event(event))", event)
+        thumb["y"] -= 6
+        kind = "touchMove" if event else "touchStart"
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [thumb]})
+        if event != "blur":
+            driver.page.wait_for_timeout(400)
+            made.wait(lambda intent, deflected=deflected: bool(intent.raw.axes) == deflected)
+
+
+def test_a_kept_key_never_takes_the_stop(on_bench):
+    made, driver = on_bench()
+    driver.press("KeyH")
+    driver.page.get_by_role("button", name="hand forward: W").click()
+    driver.press("F9")
+    spoil = "(name) => { localStorage[name] = localStorage[name].replaceAll('F9', 'Space'); }"
+    driver.page.evaluate(spoil, f"handrail:map:{made.robot}")
+    driver.page.reload()
+    expect(driver.at("numbers")).not_to_be_empty()
+    made.begin(1)
+    driver.begin()
+    driver.press("Space")
+    driver.expect_phase("STOPPED")
+
+
+@pytest.mark.parametrize(
+    ("refuses", "asked", "is_open"), [((), ["pause"], True), (("success",), ["success"], False)]
+)
+def test_only_who_may_say_done_is_asked_whether_it_is(on_bench, refuses, asked, is_open):
+    script = """async (refuses) => {
+      const { Decision } = await import("./decision.js"), asked = [];
+      const made = new Decision((what) => asked.push(what), () => "");
+      made.stage({ refuses });
+      made.frame({ phase: "driving", practice: false, judge: false });
+      made.success();
+      return [asked, made.isOpen];
+    }"""
+    _, driver = on_bench()
+    assert driver.page.evaluate(script, list(refuses)) == [asked, is_open]
+
+
+@pytest.mark.parametrize(
+    ("now", "chip", "banner"),
+    [
+        ({"isDriver": False, "isConnected": True}, "you watch: practice, not recorded", ""),
+        ({"isDriver": True, "isConnected": True}, "practice: not recorded", ""),
+        ({"isDriver": False, "isConnected": False}, "no connection", "No connection. Trying again …"),
+    ],
+)
+def test_who_watches_is_told_what_is_so(on_bench, now, chip, banner):
+    _, driver = on_bench()
+    script = "async (now) => (await import('./states.js')).stateOf(now)"
+    state = driver.page.evaluate(script, now | {"frame": {"phase": "driving", "practice": True}})
+    assert (state["chip"], state["banner"]) == (chip, banner)
