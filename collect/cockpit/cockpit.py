@@ -134,18 +134,18 @@ class Cockpit:
         if self._all_dropped:
             counts = ", ".join(f"{count} {why}" for why, count in self._all_dropped.items())
             self._say(f"dropped or refused by the page's server: {counts}")
-        saved, succeeded = self._episodes.saved, self._episodes.succeeded
-        said = {"saved": saved, "succeeded": succeeded, "folder": self._folder}
-        said["next"] = list(self._next) if saved else []
+        saved = self._episodes.saved
+        said = {"saved": saved, "folder": self._folder, "next": list(self._next) if saved else []}
         self._server.pipe.send_surely(Kind.OVER, said)
         self._server.close()
 
     @property
     def _all_dropped(self) -> dict[str, int]:
         """What was dropped or refused on the way to pages and back, by why."""
-        ours = self._server.pipe.dropped
-        room = {"frames without room": ours[Kind.FRAME], "pictures without room": ours[Kind.PICTURE]}
-        return self._dropped | {why: count for why, count in room.items() if count}
+        kinds, ours = {"frames": Kind.FRAME, "pictures": Kind.PICTURE}, self._server.pipe.dropped
+        return self._dropped | {
+            f"{what} without room": ours[kind] for what, kind in kinds.items() if ours[kind]
+        }
 
     def _picture(self, images: Mapping[str, np.ndarray]) -> None:
         """Show what the cameras see, unless that was just now."""

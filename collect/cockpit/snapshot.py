@@ -145,8 +145,7 @@ class Snapshots:
         shown |= {"ghosts": [], "ghost_base": [], "paths": [], "track": []}
         if frame is None:
             return shown
-        status = frame.diagnostics.status
-        shown["status"] = status.value
+        shown["status"] = (status := frame.diagnostics.status).value
         shown["reason"] = reason(status, self._env.plant.contacts, q, model.description)
         asked = of_person(frame.intent)
         hands = hands_ahead(model, asked, view.task.tools, q)

@@ -21,13 +21,8 @@ export class TouchSticks {
       this.deflect(side, [x / length, y / length]);
     };
     stick.addEventListener("pointerdown", (event) => { event.preventDefault(); stick.setPointerCapture(this.held[side] = event.pointerId); move(event); });
-    stick.addEventListener("pointermove", (event) => { if (this.held[side] === event.pointerId) move(event); });
-    for (const end of ENDS) stick.addEventListener(end, (event) => { if (this.held[side] === event.pointerId) this.drop(side); });
-  }
-
-  drop(side) {
-    delete this.held[side];
-    this.deflect(side, [0, 0]);
+    stick.addEventListener("pointermove", (event) => { if (this.held[side] === event.pointerId && stick.hasPointerCapture(event.pointerId)) move(event); });
+    for (const end of ENDS) stick.addEventListener(end, (event) => { if (this.held[side] === event.pointerId) this.deflect(side, [0, 0]); });
   }
 
   deflect(side, [x, y]) {
@@ -54,7 +49,8 @@ export class TouchSticks {
 
   letGo() {
     this.lift = 0;
-    for (const side of ["left", "right"]) this.drop(side); // a finger that stays there has to go first
+    this.held = {}; // a finger that stays there has to go first
+    for (const side of ["left", "right"]) this.deflect(side, [0, 0]);
   }
 
   moves() {
