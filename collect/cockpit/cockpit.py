@@ -26,7 +26,7 @@ from handrail.collect.config import RecordConfig
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Input
-from handrail.collect.operators.person.person import Person
+from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
@@ -100,6 +100,8 @@ class Cockpit:
             self._strain.note(now - self._acted - self._env.period)
         self._listen()
         answer = self.person.act(view)
+        if self.person.phase is not Phase.DRIVING:  # there may be no frame to see
+            self._picture(view.observation.get("pixels", {}))
         moment = self._snapshots.now(view, self.person, now) | {
             "saved": self._episodes.saved,
             "succeeded": self._episodes.succeeded,
@@ -116,10 +118,7 @@ class Cockpit:
         self._snapshots.see(frame)
         self._delay = frame.commanded - frame.wall_clock
         self._poses.see(frame.number, self._env.simulation.data)
-        if frame.images and time.monotonic() > self._pictured + 0.9 * self._strain.picture_period:
-            self._pictured = time.monotonic()
-            for index, picture in enumerate(frame.images.values()):
-                self._server.pipe.send(Kind.PICTURE, bytes([index]) + _jpeg(picture))
+        self._picture(frame.images)
 
     def end(self, outcome: Outcome) -> None:
         """Count an episode; keep its poses, if it is kept."""
@@ -135,18 +134,25 @@ class Cockpit:
         if self._all_dropped:
             counts = ", ".join(f"{count} {why}" for why, count in self._all_dropped.items())
             self._say(f"dropped or refused by the page's server: {counts}")
-        saved, succeeded = self._episodes.saved, self._episodes.succeeded
-        said = {"saved": saved, "succeeded": succeeded, "folder": self._folder}
-        said["next"] = list(self._next) if saved else []
+        saved = self._episodes.saved
+        said = {"saved": saved, "folder": self._folder, "next": list(self._next) if saved else []}
         self._server.pipe.send_surely(Kind.OVER, said)
         self._server.close()
 
     @property
     def _all_dropped(self) -> dict[str, int]:
         """What was dropped or refused on the way to pages and back, by why."""
-        ours = self._server.pipe.dropped
-        room = {"frames without room": ours[Kind.FRAME], "pictures without room": ours[Kind.PICTURE]}
-        return self._dropped | {why: count for why, count in room.items() if count}
+        kinds, ours = {"frames": Kind.FRAME, "pictures": Kind.PICTURE}, self._server.pipe.dropped
+        return self._dropped | {
+            f"{what} without room": ours[kind] for what, kind in kinds.items() if ours[kind]
+        }
+
+    def _picture(self, images: Mapping[str, np.ndarray]) -> None:
+        """Show what the cameras see, unless that was just now."""
+        if images and time.monotonic() > self._pictured + 0.9 * self._strain.picture_period:
+            self._pictured = time.monotonic()
+            for index, picture in enumerate(images.values()):
+                self._server.pipe.send(Kind.PICTURE, bytes([index]) + _jpeg(picture))
 
     def _listen(self) -> None:
         """Take what the server has passed on."""
@@ -222,6 +228,7 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
         f"handrail-train {folder} --output outputs/policy",
     ]
     settings = {"folder": folder, "wanted": wanted, "next": then, "say": say, "shared": bool(config.policy)}
+    settings["refuses"] = ("undo",) if env.real else ()  # nothing that moved goes back by itself
     return Cockpit(env.model, modes, config.mode_name, server, **settings)
 
 

@@ -64,7 +64,8 @@ class EpisodeList:
         """Count an episode; keep its poses, if it is kept."""
         self.saved += outcome.kept
         self.succeeded += outcome.kept and outcome.success
-        words = "success" if outcome.success else outcome.failure_reason or str(outcome.ended_by)
+        reason = outcome.failure_reason.replace("_", " ") or str(outcome.ended_by)
+        words = "success" if outcome.success else reason
         words += "; you said done" if outcome.operator_says == "success" and not outcome.success else ""
         words = f"practice: {words}" if outcome.practice else words
         said = {"kept": outcome.kept, "success": outcome.success, "said": words, "seconds": outcome.seconds}

@@ -9,12 +9,12 @@ answer   card, item, value      to a question on a card; comes again until the c
 ```
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta
+from msgspec import DecodeError, Meta
+from msgspec.json import decode
 
 from handrail.collect.operators.person.inputs import ASKS, MOST, STILLS, Ask, Input
 from handrail.controllers.errors import HandrailError, shown
@@ -27,7 +27,7 @@ _VALUES: Mapping[type, Any] = {
     bool: bool,
     str: Annotated[str, Meta(max_length=100)],
     float: Fraction,
-    list: Annotated[tuple[int, ...], Meta(max_length=MOST)],
+    list: Annotated[tuple[Annotated[int, Meta(ge=0, lt=2**53)], ...], Meta(max_length=MOST)],
 }
 _Label = Annotated[str, Meta(max_length=200)]
 
@@ -78,8 +78,8 @@ def parse(text: str | bytes) -> Message:
     if len(text) > LARGEST:
         raise HandrailError(f"message: expected at most {LARGEST} bytes, got {len(text)}")
     try:
-        return _typed(json.loads(text, parse_constant=_no_number))
-    except (ValueError, RecursionError) as error:  # also half of a surrogate pair where a name is expected
+        return _typed(decode(text))
+    except (DecodeError, ValueError, RecursionError) as error:  # also half of a surrogate pair
         raise HandrailError("message: expected JSON") from error
 
 
@@ -99,7 +99,3 @@ def _typed(said: Any) -> Message:
     if not isinstance(what, str) or what not in _ASKS:
         raise HandrailError(f"ask: expected one of {', '.join(_ASKS)}, got {shown(what)}")
     return Ask(what, check(value, _VALUES[_ASKS[what]], what))
-
-
-def _no_number(word: str) -> float:
-    raise ValueError(word)

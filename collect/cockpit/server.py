@@ -146,7 +146,7 @@ def _listening(host: str, port: int) -> socket.socket:
     """Return a socket that listens at a port, or one of the next ones."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     place, trouble = "127.0.0.1" if host == "localhost" else host, ""
-    for trial in range(port, port + _TRIES if port else 1):
+    for trial in range(port, min(port + _TRIES, 2**16) if port else 1):
         try:
             dual = family == socket.AF_INET6 and socket.has_dualstack_ipv6()  # `::` takes IPv4, too
             return socket.create_server((place, trial), family=family, backlog=64, dualstack_ipv6=dual)

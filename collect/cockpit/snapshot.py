@@ -66,7 +66,8 @@ class Snapshots:
         self._env, self._model = env, env.model
         self._nearest = NearestPair(env.simulation.mujoco_model)
         self._frame: Frame | None = None
-        self._undo_to = 0.0  # the moment that an undo goes back to [s]
+        self._undo_to = self._time = 0.0  # the moment that an undo goes back to, and the last one [s]
+        self._undos = 0
 
     def see(self, frame: Frame) -> None:
         """Take how the controller fared."""
@@ -81,6 +82,9 @@ class Snapshots:
             stamp: of the clock of inputs [s].
         """
         setting, env, state = person.setting, self._env, view.state
+        if state.time < self._time:  # after an undo: what the frame shows has never been
+            self._frame, self._undos = None, self._undos + 1
+        self._time = state.time
         if person.phase is not Phase.DRIVING and not np.any(state.commanded):
             self._undo_to = state.time
         return {
@@ -89,7 +93,7 @@ class Snapshots:
             "practice": person.practises,
             "aim": self._aim(view.task),
             "judge": None if env.real else env.task.outcome(view.task).success,
-            "undo_takes": round(state.time - self._undo_to, 1),
+            "undo_takes": 0.0 if env.real else round(state.time - self._undo_to, 1),
             "left": round(env.task.horizon - state.time, 1),
             "phase": person.phase.value,
             "poses": stage.poses(env.simulation.data),
@@ -137,12 +141,11 @@ class Snapshots:
         of each hand, (k, 3), and the track of the base's x, y, yaw, (k, 3) [m, rad].
         """
         frame, model, q = self._frame, self._model, view.state.q
-        shown: dict[str, Any] = {"undos": 0, "status": "ok", "reason": ""}
+        shown: dict[str, Any] = {"undos": self._undos, "status": "ok", "reason": ""}
         shown |= {"ghosts": [], "ghost_base": [], "paths": [], "track": []}
         if frame is None:
             return shown
-        status = frame.diagnostics.status
-        shown["undos"], shown["status"] = frame.undos, status.value
+        shown["status"] = (status := frame.diagnostics.status).value
         shown["reason"] = reason(status, self._env.plant.contacts, q, model.description)
         asked = of_person(frame.intent)
         hands = hands_ahead(model, asked, view.task.tools, q)

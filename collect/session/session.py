@@ -181,7 +181,7 @@ class Session:
                         observer.see(frame)
             if self.realtime:
                 loop.tally.pace()
-        return None if event is EpisodeEvent.PAUSE else event
+        return event if event and (event.judges or event.drops) else None  # else the task has ended it
 
     def _warn_if_slow(self, loop: EpisodeLoop) -> None:
         """Warn when more than one update in a hundred took longer than the period, in real time."""

@@ -64,7 +64,9 @@ class Driving:
         self._recording = Recording(config, env, [self._cockpit])
         self._recording.into(writer)
         self._recording.warm_up(seed)
-        mask = channels.mask(*modes[mode].owned("hand")) | channels.mask(*modes[mode].owned("base"))
+        self._cockpit.begin(env, seed)  # the card that comes says keys: of this robot and task
+        hand = env.model.hand.name
+        mask = channels.mask(*modes[mode].owned("hand", hand), *modes[mode].owned("base", hand))
         owned = tuple(name for name, own in zip(channels.names, mask, strict=True) if own)
         return Briefing(env.task.description, modes[mode].help, owned)
 

@@ -29,12 +29,14 @@ class Bench:
         intent: the newest one; None while the person does not drive.
         events: what was said of the episode, pauses left out.
         address: of the page.
+        server: of the page.
     """
 
     def __init__(self, env, mode):
         modes = build_modes(RecordConfig(task="reach"), env)
-        self._env, server = env, ServerProcess(CockpitConfig(port=0, open=False))
-        self.address, self.cockpit = server.address, Cockpit(env.model, modes, mode, server)
+        self._env, self.server = env, ServerProcess(CockpitConfig(port=0, open=False))
+        self.address = self.server.address
+        self.cockpit = Cockpit(env.model, modes, mode, self.server)
         self.intent, self.events, self.seed = None, [], 0
         self._over, self._is_begun = threading.Event(), True
         self._thread = threading.Thread(target=self._run)

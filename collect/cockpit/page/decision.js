@@ -39,7 +39,7 @@ export class Decision {
   // The person says that the task is done.
   success() {
     if (this.isOpen) this.answer("success");
-    else if (this.isOngoing && !this.now.practice && this.judgement) this.open("Save it as done all the same?", false);
+    else if (this.isOngoing && !this.now.practice && this.saves && this.judgement) this.open("Save it as done all the same?", false);
     else this.ask("success");
   }
 

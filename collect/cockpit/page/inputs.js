@@ -18,7 +18,7 @@ const isTyping = (element) => element.matches("textarea, input:not([type=range],
 
 // What a key does by itself in the control that has the focus: it must stay so for those who use no mouse.
 function isNative(element, code) {
-  if (element.matches("select, input[type=range], [role=slider]")) return NATIVE.includes(code);
+  if (element.matches("select, input[type=range], input[type=radio], [role=slider]")) return NATIVE.includes(code);
   return code === "Enter" && element.matches("button, summary, a, input");
 }
 
@@ -59,7 +59,8 @@ export class Inputs {
   }
 
   press(event) {
-    if (!this.mapping || isTyping(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.metaKey) this.held.clear(); // macOS tells of no key that goes up while that one is held
+    if (!this.mapping || isTyping(event.target) || (event.code !== STOP && (event.ctrlKey || event.metaKey || event.altKey))) return;
     if (event.code === BACK) {
       if (this.act("back")) event.preventDefault();
       return;
@@ -80,7 +81,7 @@ export class Inputs {
       event.preventDefault();
       if (!event.target.matches("body, [role=slider]")) document.activeElement.blur();
     }
-    if (driving) this.held.add(event.code);
+    if (driving && !event.repeat) this.held.add(event.code); // else it was held before: it has to go up first
   }
 
   entriesInForce() {
@@ -93,10 +94,10 @@ export class Inputs {
   }
 
   // The channel that an axis of keys and sticks is now.
-  channelOf(axis) {
+  channelOf(axis, parts = this.parts) {
     const [part, way] = axis.split(".");
-    if (!(part in this.parts)) return axis;
-    return this.parts[part].includes(".") ? this.parts[part] : `${this.parts[part]}.${way}`;
+    if (!(part in parts)) return axis;
+    return parts[part].includes(".") ? parts[part] : `${parts[part]}.${way}`;
   }
 
   flipGrip(hand) {

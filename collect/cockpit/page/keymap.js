@@ -139,6 +139,8 @@ export function sticksInForce(owned, turns, bank) {
   return { sticks: [...chosen, ...extra].filter(([, axis]) => drives(axis, owned)), count: all.length };
 }
 
+// Keys go by their place; what this keyboard has there is said where the browser knows it.
+const layout = await navigator.keyboard?.getLayoutMap().catch(() => null);
 const KEY_NAMES = {
   Backquote: "`", Minus: "−", Equal: "=", BracketLeft: "[", BracketRight: "]", Semicolon: ";", Quote: "'", Comma: ",",
   Period: ".", Slash: "/", Backslash: "\\", ArrowRight: "→", ArrowLeft: "←", ArrowUp: "↑", ArrowDown: "↓",
@@ -146,6 +148,8 @@ const KEY_NAMES = {
 };
 
 export function keyName(code) {
+  const own = code.startsWith("Digit") ? null : layout?.get(code);
+  if (own) return code.startsWith("Key") ? own.toUpperCase() : own;
   return KEY_NAMES[code] ?? code.replace(/^Key|^Digit/, "");
 }
 

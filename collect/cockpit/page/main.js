@@ -68,13 +68,13 @@ const panels = new Panels(link);
 const masks = new Masks(link);
 const episodes = new Episodes(link);
 const help = new Help(inputs, gamepad, label);
-const study = new Study(link, (owned) => inForce(inputs.entries, owned));
+const study = new Study(link, keysOf);
 const xr = new XrHands(byId("xr"), inputs, (what, value) => link.ask(what, value), (words) => notices.say(words), (session) => view.headset.enter(session, show, () => view.fit()));
 inputs.sources.push(gamepad, touch, sliders, xr);
 foldPanels();
 
 function faster(change) {
-  if (frame) link.ask("speed", Math.min(1, Math.max(0.2, Number((frame.speed + change).toFixed(1)))));
+  if (frame) link.ask("speed", Math.min(1, Math.max(0.1, Number((frame.speed + change).toFixed(1)))));
 }
 
 function otherFocus() {
@@ -119,6 +119,10 @@ function label() {
 
 for (const name of ["start", "pause", "undo", "success", "failure", "restart", "discard", "quit", "stop"]) byId(name).addEventListener("click", () => act(name));
 for (const id of ["help-open", "help-close"]) byId(id).addEventListener("click", () => act("help"));
+document.addEventListener("pointerup", (event) => { // while one finger steers browsers make no click of another one's
+  const button = event.isPrimary ? null : event.target.closest("button");
+  if (button?.contains(document.elementFromPoint(event.clientX, event.clientY))) button.click();
+});
 document.addEventListener("click", (event) => { // the mouse leaves no focus behind: the next key is for the robot
   if (event.detail > 0) event.target.closest("button, summary, input[type=checkbox], input[type=range]")?.blur();
 });
@@ -136,19 +140,30 @@ function bodiesOf(owned) {
   return lit;
 }
 
-// The channels that the operator owns; and, where they own all joints of the base, that its keys and sticks mean these.
-function owned() {
-  const names = new Set(named(frame.mask.map((index) => stage.channels[index]), inputs.parts));
+// Channels, by the names of axes too; and, where all joints of the base are among them, that its keys and sticks mean these.
+function meant(channels, parts) {
+  const names = new Set(named(channels, parts));
   const base = stage.joints.slice(0, stage.base).map((name) => `joint.${name}`);
   return base.length && !names.has("base.vx") && base.every((name) => names.has(name)) ? names.add(BY_JOINTS) : names;
+}
+
+// The keys where these channels are owned, and of what is done once: [[code, channel or words, sign], …].
+function keysOf(channels) {
+  if (!inputs.mapping) return [];
+  const { actions, offered } = inputs.mapping, grips = stage.grips ? ["grip", "grip_left", "grip_right"] : [];
+  const parts = partsOf(channels, stage.hands.map(({ name }) => name), frame?.hand ?? 0, groups[0]?.channels ?? []);
+  const held = inForce(inputs.entries, meant(channels, parts)).map(([code, axis, sign]) => [code, inputs.channelOf(axis, parts), sign]);
+  const once = ["start", ...grips, "failure", "quit", "stop"].filter((name) => name in offered);
+  return [...held, ...once.map((name) => [actions[name], name === "quit" ? "pause" : offered[name].says])];
 }
 
 function own() {
   if (frame.hand !== active && groups[group].hand !== frame.hand) group = Math.max(0, groups.findIndex(({ hand }) => hand === frame.hand));
   active = frame.hand;
   const before = Object.values(inputs.parts).join();
-  inputs.parts = partsOf(frame.mask.map((index) => stage.channels[index]), stage.hands.map(({ name }) => name), active, groups[group].channels);
-  const names = owned();
+  const channels = frame.mask.map((index) => stage.channels[index]);
+  inputs.parts = partsOf(channels, stage.hands.map(({ name }) => name), active, groups[group].channels);
+  const names = meant(channels, inputs.parts);
   if (before === Object.values(inputs.parts).join() && [...names].join() === [...inputs.owned].join()) return;
   inputs.owned = names;
   inputs.bank = 0;

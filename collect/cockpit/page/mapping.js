@@ -33,7 +33,7 @@ function renewed(kept, first) {
 // What was kept fits this robot and this page, piece by piece.
 function isFine(kept, first) {
   const keys = Array.isArray(kept.keys) && kept.keys.length === first.keys.length
-    && kept.keys.every((entry, index) => Array.isArray(entry) && isCode(entry[0]) && entry[1] === first.keys[index][1] && entry[2] === first.keys[index][2]);
+    && kept.keys.every((entry, index) => Array.isArray(entry) && isCode(entry[0]) && entry[0] !== STOP && entry[1] === first.keys[index][1] && entry[2] === first.keys[index][2]);
   const actions = sameNames(kept.actions, first.actions) && Object.values(kept.actions).every(isCode) && kept.actions.stop === STOP;
   const buttons = sameNames(kept.buttons, first.buttons) && Object.values(kept.buttons).every(isIndex) && kept.buttons.deadman >= 0;
   const sticks = kept.sticks === null || (Array.isArray(kept.sticks) && kept.sticks.length === 4

@@ -33,7 +33,9 @@ function overWords({ saved, folder, next }) {
 export function stateOf(now) {
   if (now.over) return { name: "over", chip: "no connection: recording is over", banner: overWords(now.over) };
   const name = nameOf(now), [chip, banner] = STATES[name];
-  if (name === "watching") return { name, chip: WATCHED[now.frame.phase], banner: "" };
+  const isPractice = name === "watching" && now.frame.practice && now.frame.phase === "driving";
+  if (name === "watching") return { name, chip: isPractice ? "you watch: practice, not recorded" : WATCHED[now.frame.phase], banner: "" };
+  if (name === "offline" && !now.isDriver) return { name, chip, banner: "No connection. Trying again …" }; // who drives may go on
   if (name === "stopped" && !now.isDriver) return { name, chip, banner: "The robot is stopped. Only the driver can release it." };
   return { name, chip, banner: banner || (now.isLate ? LATE : "") };
 }

@@ -6,7 +6,7 @@ const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
 
 export class TouchSticks {
   constructor(box, inputs, act) {
-    Object.assign(this, { box, inputs, device: "touch", lift: 0, deflected: { left: [0, 0], right: [0, 0] } });
+    Object.assign(this, { box, inputs, device: "touch", lift: 0, held: {}, deflected: { left: [0, 0], right: [0, 0] } });
     this.knobs = [...box.querySelectorAll(".stick")];
     for (const stick of this.knobs) this.stick(stick);
     for (const lever of box.querySelectorAll("[data-lever]")) this.lever(lever, act);
@@ -20,9 +20,9 @@ export class TouchSticks {
       const length = Math.max(1, Math.hypot(x, y));
       this.deflect(side, [x / length, y / length]);
     };
-    stick.addEventListener("pointerdown", (event) => { event.preventDefault(); stick.setPointerCapture(event.pointerId); move(event); });
-    stick.addEventListener("pointermove", (event) => { if (stick.hasPointerCapture(event.pointerId)) move(event); });
-    for (const end of ENDS) stick.addEventListener(end, () => this.deflect(side, [0, 0]));
+    stick.addEventListener("pointerdown", (event) => { event.preventDefault(); stick.setPointerCapture(this.held[side] = event.pointerId); move(event); });
+    stick.addEventListener("pointermove", (event) => { if (this.held[side] === event.pointerId && stick.hasPointerCapture(event.pointerId)) move(event); });
+    for (const end of ENDS) stick.addEventListener(end, (event) => { if (this.held[side] === event.pointerId) this.deflect(side, [0, 0]); });
   }
 
   deflect(side, [x, y]) {
@@ -49,6 +49,7 @@ export class TouchSticks {
 
   letGo() {
     this.lift = 0;
+    this.held = {}; // a finger that stays there has to go first
     for (const side of ["left", "right"]) this.deflect(side, [0, 0]);
   }
 

@@ -1,7 +1,7 @@
 // Cards of a user study: what a participant reads and answers, above everything else; a strip while they drive.
 // An answer is sent until the card comes back with it: then it is on the disk.
 import { drawItem } from "./form.js";
-import { ACTIONS, axisName, keyName } from "./keymap.js";
+import { axisName, keyName } from "./keymap.js";
 
 const AGAIN = 1000; // after which an answer that is not yet kept is sent again [ms]
 const NEXT = ":next", PAUSE = ":pause";
@@ -15,7 +15,7 @@ function make(tag, id, text = "") {
 }
 
 export class Study {
-  // keys(owned): the mapping in force where these channels are owned, [[code, axis, sign], …]
+  // keys(owned): the keys where these channels are owned, [[code, channel or words, sign], …]
   constructor(link, keys) {
     this.link = link;
     this.keys = keys;
@@ -121,8 +121,7 @@ export class Study {
 
   keyTable(owned) {
     const table = make("dl", "study-keys");
-    const rows = [...this.keys(new Set(owned)), ["Enter", "start"], ["ArrowDown", "failed"], [ACTIONS.quit.key, "pause"], ["Space", "STOP"]];
-    for (const [code, axis, sign] of rows) {
+    for (const [code, axis, sign] of this.keys(owned)) {
       const name = document.createElement("dt"), key = document.createElement("dd");
       name.textContent = sign ? axisName(axis, sign) : axis;
       key.append(Object.assign(document.createElement("kbd"), { textContent: keyName(code) }));

@@ -1,6 +1,7 @@
 """Laws of the poses that are kept of an episode: what a page plays is what was; old ones make room."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -91,6 +92,13 @@ def test_what_is_thrown_away_is_told_and_not_kept():
     listed.add(outcome(EpisodeEvent.DISCARD), None)
     assert (listed.saved, listed.succeeded, files) == (0, 0, {})
     assert [each["kept"] for each in listed.described()] == [False]
+
+
+def test_why_an_episode_failed_is_said_in_words():
+    files = {}
+    listed = EpisodeList(SimpleNamespace(keep=files.__setitem__, drop=files.__delitem__))
+    listed.add(replace(outcome(EpisodeEvent.DISCARD), success=False, failure_reason="tray_dropped"), None)
+    assert [each["said"] for each in listed.described()] == ["tray dropped"]
 
 
 def test_pages_get_them_as_they_get_meshes():

@@ -62,7 +62,9 @@ def test_a_drive_and_an_ask():
         said(axes=[10**400]), said(view="\ud800"),
         answer(value=[]), answer(value={}), answer(value=float("nan")), answer(value=1e12),
         answer(value=2**70), answer(card=3), answer(item=None), answer(item="x" * 300), answer(more=1),
-        answer(value="x" * 5000),
+        answer(value="x" * 5000), answer(value="\ud800"), answer(card="\ud800"),
+        '{"kind": "ask", "what": "mode", "value": "\\ud800"}',
+        '{"kind": "ask", "what": "mask", "value": [' + "1" * 400 + "]}",
         " " * (LARGEST + 1),
     ],
 )  # fmt: skip

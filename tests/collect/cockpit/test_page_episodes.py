@@ -117,7 +117,8 @@ def test_the_mode_changes_in_motion_without_a_jolt(new_page, tmp_path):
             driver.choose("mode", mode)
             expect(driver.at("mode-help")).not_to_have_text(before)  # its controller has taken over
             driver.page.evaluate("document.activeElement.blur()")
-            driver.page.keyboard.down("Digit1")  # what meant nothing when it was pressed means nothing now
+            driver.page.keyboard.up("Digit1")  # what meant nothing when it was pressed means nothing now
+            driver.page.keyboard.down("Digit1")
         driver.page.wait_for_timeout(500)
         for key in keys:
             driver.page.keyboard.up(key)

@@ -3,7 +3,7 @@
 import json
 import socket as sockets
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from urllib.parse import urlsplit
 
 import pytest
@@ -12,7 +12,8 @@ from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatu
 
 from handrail.collect.cockpit.page_socket import REPLACED
 from handrail.collect.cockpit.pipe import Kind
-from handrail.collect.cockpit.process import MOST_DEATHS
+from handrail.collect.cockpit.process import MOST_DEATHS, ServerProcess
+from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
 
@@ -158,6 +159,14 @@ def test_the_token_can_be_asked_for_on_this_computer_too():
         assert status == 200
         with page(made, cookie=headers["set-cookie"].split(";")[0]) as socket:
             assert told(socket, "you")["driving"]
+
+
+def test_no_port_after_the_last_one_is_tried():
+    with ExitStack() as stack:
+        with suppress(OSError):  # it is taken already
+            stack.enter_context(sockets.create_server(("127.0.0.1", 65535)))
+        with pytest.raises(HandrailError, match="port 65535"):
+            ServerProcess(CockpitConfig(port=65535, open=False))
 
 
 def test_the_server_ends_with_the_recording():

@@ -203,6 +203,22 @@ def test_an_undo_takes_what_came_after_the_last_rest(env, person):
     assert snapshots.now(at(6.0, True), person, 0.0)["undo_takes"] == 1.5
 
 
+def test_after_an_undo_nothing_is_drawn_of_what_has_never_been(env, person):
+    snapshots, now = Snapshots(env), view(env)
+    at = lambda time: replace(now, state=replace(now.state, time=time))  # noqa: E731
+    person.ask(Ask("start"))
+    snapshots.see(frame(env))
+    driven = snapshots.now(at(3.0), person, 0.0)
+    assert driven["ghosts"][0]
+    assert driven["track"]
+    assert driven["undos"] == 0
+    for undos in (1, 2):
+        undone = snapshots.now(at(1.0 / undos), person, 0.0)
+        assert not any(undone["ghosts"] + undone["paths"])
+        assert not undone["track"]
+        assert undone["undos"] == undos
+
+
 def test_the_disk_says_how_many_episodes_fit(tmp_path):
     folder = tmp_path / "to" / "come"
     room = DiskRoom(folder)

@@ -123,6 +123,15 @@ def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
     assert [row["length"] for row in read_episodes(tmp_path / "d")] == [5]
 
 
+def test_an_undo_where_there_is_none_loses_no_episode(env, monkeypatch):
+    """Of a robot that cannot go back: the task ends the episode in the period in which somebody asks."""
+    whole, _, _ = run(env, {})
+    last = whole.frames
+    outcome, _, _ = run(env, {last: EpisodeEvent.UNDO})
+    assert (outcome.frames, outcome.failure_reason) == (last, whole.failure_reason)
+    assert outcome.kept
+
+
 def test_a_dataset_of_before_goes_on_with_the_columns_that_it_has(env, tmp_path):
     """Its episodes do not say what the operator said; that is why it failed, in words."""
     old = {"success": True, "failure_reason": "", "seed": 3, "started": 0.0, "wall_time": 1.0}

@@ -1,4 +1,4 @@
-"""A law of a study's trials: a STOP holds until somebody releases it, in the next mode too."""
+"""Laws of a study's trials: a STOP holds in the next mode too; keys are said to who knows the robot."""
 
 from collections import Counter
 
@@ -15,6 +15,7 @@ class StoppingServer:
 
     def __init__(self):
         self.pipe, self.dropped, self.unread = self, Counter(), [(Kind.STOP, None)]
+        self.sent = []
 
     def receive(self):
         messages, self.unread = self.unread, []
@@ -23,7 +24,10 @@ class StoppingServer:
     def send(self, *message, **more):
         pass
 
-    send_surely = keep = drop = send
+    def send_surely(self, kind, *message, **more):
+        self.sent.append(kind)
+
+    keep = drop = send
 
 
 def test_a_stop_holds_in_the_next_mode(tmp_path):
@@ -34,3 +38,10 @@ def test_a_stop_holds_in_the_next_mode(tmp_path):
         assert not server.unread
         driving.prepare("direct", "reach")
         assert server.unread == [(Kind.STOP, None)]
+
+
+def test_the_page_knows_the_robot_before_a_card_says_its_keys(tmp_path):
+    server, folder = StoppingServer(), study_folder(tmp_path)
+    with Interrupts() as interrupts, Driving(folder, "P001", server, interrupts) as driving:
+        driving.prepare("ee", "reach")
+        assert Kind.STAGE in server.sent

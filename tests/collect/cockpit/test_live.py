@@ -1,0 +1,83 @@
+"""Laws of what the page is told while nobody drives: pictures are of now, nothing is offered in vain."""
+
+import io
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from collect_helpers import environment
+from PIL import Image
+
+from handrail.collect.cockpit import cockpit
+from handrail.collect.cockpit.pipe import Kind
+from handrail.collect.cockpit.strain import Strain
+from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.person.inputs import Ask
+
+
+class Server:
+    """Keeps what it is sent."""
+
+    def __init__(self):
+        self.pipe, self.dropped, self.sent = self, Counter(), list[tuple[Kind, object]]()
+
+    def send(self, kind, value=None, *more):
+        self.sent.append((kind, value))
+
+    send_surely = send
+
+    def of(self, kind):
+        return [value for each, value in self.sent if each is kind]
+
+    def keep(self, name, data):
+        pass
+
+    def receive(self):
+        return []
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Open the cockpit of a robot; give it, what its server was sent, and what there is to see."""
+    server = Server()
+    monkeypatch.setattr(cockpit, "open_server", lambda config, say: server)
+    monkeypatch.setattr(Strain, "picture_period", 0.0)
+    with environment("Reach") as env:
+
+        def made(real=False):
+            env.reset(seed=3)
+            monkeypatch.setattr(env, "real", real)
+            config = RecordConfig(task="reach", mode="ee", dataset=DatasetConfig(place="somewhere"))
+            person = cockpit.open_cockpit(config, env, lambda words: None)
+            view = View(env.plant.state(), env.task_state())
+            person.begin(env, 3)
+            person.reset(view, np.random.default_rng(0))
+            return person, server, view
+
+        yield made
+
+
+def shade(jpeg):
+    return np.asarray(Image.open(io.BytesIO(jpeg[1:]))).mean()
+
+
+def test_in_a_pause_pictures_are_of_now(opened):
+    """Before Start, after an undo and while a real robot is paused there are no frames."""
+    person, server, view = opened()
+    for level in (10, 200):
+        pixels = {"front": np.full((32, 48, 3), level, np.uint8)}
+        person.act(replace(view, observation={"pixels": pixels}))
+        assert shade(server.of(Kind.PICTURE)[-1]) == pytest.approx(level, abs=3)
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_only_what_a_robot_can_do_is_offered(opened, real):
+    person, server, view = opened(real)
+    assert ("undo" in server.of(Kind.STAGE)[-1]["refuses"]) == real
+    person.person.ask(Ask("start"))
+    for time in (0.0, 3.0):
+        moving = replace(view.state, time=time, commanded=np.full(len(view.state.q), time))
+        person.act(replace(view, state=moving))
+    assert server.of(Kind.FRAME)[-1]["undo_takes"] == (0.0 if real else 3.0)
