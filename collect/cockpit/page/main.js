@@ -117,7 +117,10 @@ function label() {
   sliders.letter(inputs.entriesInForce().map(([code, axis]) => [inputs.channelOf(axis), keyName(code)]));
 }
 
-for (const name of ["start", "pause", "undo", "success", "failure", "restart", "discard", "quit", "stop"]) byId(name).addEventListener("click", () => act(name));
+for (const name of ["start", "pause", "undo", "success", "failure", "restart", "discard", "quit"]) byId(name).addEventListener("click", () => act(name));
+let stopPressed = -Infinity; // an e-stop does not wait until the finger goes up; the click that follows is the same press [ms]
+byId("stop").addEventListener("pointerdown", (event) => { stopPressed = event.timeStamp; act("stop"); });
+byId("stop").addEventListener("click", (event) => { if (event.timeStamp - stopPressed > 1000) act("stop"); });
 for (const id of ["help-open", "help-close"]) byId(id).addEventListener("click", () => act("help"));
 document.addEventListener("pointerup", (event) => { // while one finger steers browsers make no click of another one's
   const button = event.isPrimary ? null : event.target.closest("button");

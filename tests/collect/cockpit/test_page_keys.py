@@ -83,6 +83,17 @@ def test_the_stop_counts_with_another_key_too(on_bench, with_key):
     driver.expect_phase("STOPPED")
 
 
+def test_the_stop_does_not_wait_until_the_mouse_button_goes_up(on_bench):
+    _, driver = on_bench()
+    driver.begin()
+    driver.page.locator("#stop").hover()
+    driver.page.mouse.down()
+    driver.expect_phase("STOPPED")
+    driver.page.mouse.up()
+    driver.page.wait_for_timeout(300)
+    driver.expect_phase("STOPPED")
+
+
 def test_slower_is_never_faster(on_bench):
     _, driver = on_bench()
     expect(driver.at("speed-said")).to_have_text("60 %")
