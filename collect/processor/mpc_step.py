@@ -31,7 +31,7 @@ from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.command import Diagnostics, Status
+from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
@@ -45,7 +45,6 @@ from handrail.controllers.typed import Number, Positive, Text, check, check_name
 from handrail.datasets.storage.strict_json import load_json
 
 NAME = "handrail_masked_mpc"
-_HEARD = (Status.OK, Status.SOLVER_FAILED, Status.BACKUP)  # updates that listen to what is asked
 _log = logging.getLogger(__name__)
 
 
@@ -134,7 +133,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         self._body.reset(self.start)
         self._intent.reset()
         self._mpc.reset(self._around)
-        self._braking, self._before, self._has_heard = "", math.inf, False
+        self._braking, self._before = "", math.inf
 
     def action(self, action: RobotAction) -> RobotAction:
         """Return the whole robot's action."""
@@ -147,9 +146,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         command = self._mpc.update(state, intent)
         self.diagnostics = command.diagnostics
         self._note_brake(command.diagnostics)
-        self._has_heard |= command.diagnostics.status in _HEARD
-        said = np.append(command.velocity(1.0 / self.fps), command.grippers)
-        return self._body.send(said if self._has_heard else ())  # before, it knows no gripper
+        return self._body.send(np.append(command.velocity(1.0 / self.fps), command.grippers))
 
     def get_config(self) -> dict[str, Any]:
         """Return the settings."""

@@ -220,7 +220,9 @@ class EpisodeLoop:
             now.asked, now.due = step, now.due + self.control_period
             self.tally.updated(now.command)
         time = (step + 1 - now.asked) * self.env.period
-        return np.concatenate((now.command.velocity(time), now.command.grippers))
+        grippers = np.array(now.command.grippers)  # NaN: nobody has asked yet
+        grippers = np.where(np.isnan(grippers), now.info["sent"][self.env.model.size :], grippers)
+        return np.concatenate((now.command.velocity(time), grippers))
 
     @property
     def _goal(self) -> Pose | None:

@@ -174,7 +174,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             plant.dress(self._looks, self.np_random.spawn(1)[0])  # which draws nothing from it
         self._begun, self._steps = (start, plant), 0
         rest = np.append(np.zeros(self.model.size), [float(width is not None) for width in grip])
-        return self._shown(self.task_state(), rest.astype(np.float32))
+        self._sent = rest.astype(np.float32)
+        return self._shown(self.task_state())
 
     def _by_hand(self, grip: tuple[float | None, ...]) -> tuple[float | None, ...]:
         """Return the width that each hand holds, of widths that begin with the hand that does the task."""
@@ -185,31 +186,29 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move for 1/fps seconds; the reward is 1 at success. `info["sent"]` is the action that was sent."""
-        sent = self.plant.send(action)
+        self._sent = self.plant.send(action)
         self._steps += 1
         state = self.task_state()
         verdict = self.task.outcome(state) if state.stable else Verdict(failure="unstable")
         truncated = not verdict.over and self._steps >= self._max_episode_steps
         if truncated:
             verdict = Verdict(failure="timeout")
-        observation, info = self._shown(state, sent, verdict)
+        observation, info = self._shown(state, verdict)
         return observation, float(verdict.success), verdict.over and not truncated, truncated, info
 
     def rest(self) -> tuple[Observation, dict[str, Any]]:
         """Let the robot stand for a period that is none of the episode's."""
-        sent = self.plant.send(())
-        return self._shown(self.task_state(), sent)
+        self._sent = self.plant.send(())
+        return self._shown(self.task_state())
 
-    def _shown(
-        self, state: TaskState, sent: NDArray[np.floating[Any]], verdict: Verdict | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+    def _shown(self, state: TaskState, verdict: Verdict | None = None) -> tuple[Observation, dict[str, Any]]:
         """Return observation and info of a moment: the one place where they are assembled."""
         verdict, contacts = verdict or Verdict(), self.plant.contacts
         self.seen = self.state(), state
         info = {
             "is_success": verdict.success,
             "failure_reason": verdict.failure,
-            "sent": sent,
+            "sent": self._sent,
             "contacts": len(contacts),
             "contact_names": contacts,
             "time": state.time,
@@ -230,13 +229,13 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""
-        return self.plant.checkpoint(), self._steps
+        return self.plant.checkpoint(), self._steps, self._sent
 
     def restore(self, checkpoint: Any) -> tuple[Observation, dict[str, Any]]:
         """Come back to where the episode stood; from there all goes on as it did."""
-        plant, self._steps = checkpoint
+        plant, self._steps, self._sent = checkpoint
         self.plant.restore(plant)
-        return self._shown(self.task_state(), np.append(self.state().commanded, 0.0).astype(np.float32))
+        return self._shown(self.task_state())
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a good-looking picture from the scene camera, if `render_mode` is `rgb_array`."""

@@ -1,5 +1,6 @@
 """The shell of every controller that looks at this moment only: checks, limits, diagnostics."""
 
+import math
 from collections.abc import Callable
 from time import perf_counter
 
@@ -68,7 +69,7 @@ class ReactiveController:
         """Forget when inputs came, and grippers; take the obstacles whose distance is reported."""
         self.surroundings = Surroundings.of(CollisionModel(self._model, obstacles), *self._margins)
         self._inputs = InputHistory()
-        self._grippers = (0.0,) * len(self.channels.hands)
+        self._grippers = (math.nan,) * len(self.channels.hands)
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""

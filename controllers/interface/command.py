@@ -44,7 +44,7 @@ class Command(Trajectory):
     It began before now, `elapsed` > 0, where an earlier plan is being followed.
     """
 
-    grippers: tuple[float, ...] = (0.0,)  # of each hand: 0 open, 1 closed
+    grippers: tuple[float, ...] = (0.0,)  # of each hand: 0 open, 1 closed; NaN, as it is, until it is asked
     diagnostics: Diagnostics = field(default_factory=Diagnostics)  # how the controller fared
     plan: Trajectory | None = None
     """What the controller intends beyond what it has certified, to be shown; None where it has no plan.

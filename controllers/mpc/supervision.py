@@ -1,5 +1,6 @@
 """Turns a plan into a command: the plan where it is safe, else what `Backup` has instead."""
 
+import math
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -97,7 +98,7 @@ class Supervisor:
 def _grippers(loop: LoopState, intent: Intent, status: Status, hands: int) -> tuple[float, ...]:
     """Return how far grippers are closed: as asked; as before where nobody is listened to."""
     if status in _UNHEARD:
-        return (0.0,) * hands if loop.command is None else loop.command.grippers
+        return (math.nan,) * hands if loop.command is None else loop.command.grippers
     return closed(intent.grippers, hands)
 
 

@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 from collect_helpers import recording
 
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.session.build import build_controller, build_env
+from handrail.collect.session.loop import EpisodeLoop
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
@@ -150,3 +154,22 @@ def test_without_a_pause_an_undo_goes_to_the_beginning_and_one_of_nothing_is_non
     assert set(frames["teleop.undos"]) == {1}
     _, outcome = recorded(tmp_path / "e", [(UNDO, 3), (RIGHT, 4), (SUCCESS, 1)], IdealRobot)
     assert outcome.undos == 0
+
+
+@pytest.mark.parametrize("mode", ["ee", "direct", "ee_mink"])
+def test_a_hand_keeps_what_it_holds_though_nobody_has_been_heard(mode):
+    """Law: an invalid intent moves no gripper, be it the first of an episode or the first after an undo."""
+    env = build_env(SessionConfig(task="tray", mode=mode), 20)
+    loop = EpisodeLoop(env, build_controller(MODES[mode], env.model, 20))
+    size = Channels.of(env.model.description).size
+    loop.begin(0)
+    nonsense = Intent(np.full(size, np.nan), np.ones(size, dtype=bool), time=0.0)
+    begin = loop.checkpoint()
+    for _ in range(2):
+        frames = [loop.step(nonsense) for _ in range(10)]
+        assert {float(frame.action[-1]) for frame in frames} == {1.0}
+        assert all(np.isfinite(frame.command).all() and frame.diagnostics.status.brakes for frame in frames)
+        assert not loop.now.info["failure_reason"]
+        loop.restore(begin)
+        assert loop.now.info["sent"].tolist() == [0.0] * env.model.size + [1.0]
+    env.close()
