@@ -7,6 +7,7 @@ step(intent) ─▶ controller ─ command ─▶ env.step ─▶ robot.send ─
 ```
 """
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -220,8 +221,9 @@ class EpisodeLoop:
             now.asked, now.due = step, now.due + self.control_period
             self.tally.updated(now.command)
         time = (step + 1 - now.asked) * self.env.period
-        grippers = np.array(now.command.grippers)  # NaN: nobody has asked yet
-        grippers = np.where(np.isnan(grippers), now.info["sent"][self.env.model.size :], grippers)
+        grippers = now.command.grippers
+        if all(map(math.isnan, grippers)):  # nobody has asked yet; of some NaN the gate brakes
+            grippers = now.info["sent"][self.env.model.size :]
         return np.concatenate((now.command.velocity(time), grippers))
 
     @property
