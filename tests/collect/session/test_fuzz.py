@@ -67,14 +67,14 @@ def test_rude_intents_in_clutter_with_a_solver_that_fails():
 
 
 def late(robot, gaps, seeds, seconds, horizon=10):
-    """Run seeds with so long between two updates; return how far the hand went. Nothing is touched."""
+    """Run seeds with so long between two updates; return the hand's mean way. Nothing is touched."""
     model, travelled = load_model(robot), {}
     controller = MaskedMpc(model, MpcSettings.of(model.description.world.scale, horizon=horizon))
     with single_threaded():
         for gap in gaps:
             runs = {seed: run(model, controller, seed, seconds, gap=gap) for seed in seeds}
             assert not {seed: (r.own, r.standing) for seed, r in runs.items() if r.own or r.standing}, gap
-            travelled[gap] = np.median([r.travelled for r in runs.values()])
+            travelled[gap] = np.mean([r.travelled for r in runs.values()])
     return travelled
 
 
@@ -89,7 +89,7 @@ def test_late_updates_touch_nothing(robot):
 @pytest.mark.parametrize("robot", robot_names())
 def test_late_updates_touch_nothing_at_length(robot, horizon):
     travelled = late(robot, (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0), range(1000, 1012), 15.0, horizon)
-    assert travelled[0.1] > 0.7 * travelled[0.05]  # updates on time stop nothing
+    assert travelled[0.1] > 0.7 * travelled[0.05]  # updates on time stop nothing; 0.79 to 1.07
 
 
 @pytest.mark.slow
