@@ -17,7 +17,7 @@ STAGING = ".handrail"
 DAMAGED = ".damaged"
 FOLDERS = ("data", "videos", "meta")  # of a dataset; what else lies beside them is not touched
 
-_NUMBERED = re.compile(r"chunk-(\d{3,})/file-(\d{3,})\.(?:parquet|mp4)")
+NUMBERED = r"chunk-([0-9]{3}|[1-9][0-9]{3,})/file-([0-9]{3})"  # as these patterns write it: one name a file
 
 
 def chunk_and_file(episode: int) -> tuple[int, int]:
@@ -32,10 +32,8 @@ def file_index_of(chunk: int, file: int) -> int:
 
 def episode_of(path: Path) -> int | None:
     """Return which episode a data, video or metadata file belongs to, or None for a stray name."""
-    match = _NUMBERED.fullmatch("/".join(path.parts[-2:]))
-    if match is None or int(match[2]) >= FILES_IN_A_CHUNK:
-        return None
-    return file_index_of(int(match[1]), int(match[2]))
+    match = re.fullmatch(rf"{NUMBERED}\.(?:parquet|mp4)", "/".join(path.parts[-2:]))
+    return file_index_of(int(match[1]), int(match[2])) if match else None
 
 
 class Layout:

@@ -6,14 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
+from handrail.datasets.format.layout import DAMAGED, FOLDERS, NUMBERED, STAGING, Layout
 from handrail.datasets.recording.survey import shortened
 from handrail.datasets.storage.atomic import move, remove
 from handrail.datasets.storage.lock import LOCK_NAME
 
-_NUMBERED = r"chunk-(\d{3}|[1-9]\d{3,})/file-\d{3}"
 _OURS = re.compile(
-    rf"(\.damaged/[^/]+/)?((data|meta/episodes)/{_NUMBERED}\.parquet|videos/[^/]+/{_NUMBERED}\.mp4)"
+    rf"(\.damaged/[^/]+/)?((data|meta/episodes)/{NUMBERED}\.parquet|videos/[^/]+/{NUMBERED}\.mp4)"
     r"|meta/(info\.json|stats\.json|tasks\.parquet|handrail\.json|preview\.webp)"
 )
 _GIVEN_UP = "episodes"  # the episode rows of a dataset that is being cleared, in the staging folder

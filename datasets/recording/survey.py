@@ -88,16 +88,17 @@ def survey(layout: Layout, manifest: Manifest, sums: Checksums) -> Survey:
     """Look at everything, change nothing; remember the checksums."""
     rows = row_files(layout)
     streams = sorted((*layout.root.glob("videos/*/*/*.mp4"), *layout.root.glob("data/*/*.parquet")))
-    groups = _heads({number: path for path in rows if (number := episode_of(path)) is not None})
+    heads = _heads({number: path for path in rows if (number := episode_of(path)) is not None})
+    groups = list(heads.values())
     numbered = {path: number for path in streams if (number := episode_of(path)) is not None}
-    saved, counted = _end(groups), _saved_in_info(layout)
-    inside = _inside(numbered, groups) | (set(rows) - set(groups.values()))
+    saved, counted = groups[-1].stop if groups else 0, _saved_in_info(layout)
+    inside = _inside(numbered, groups) | (set(rows) - heads.keys())
     begun = {number for path, number in numbered.items() if path not in inside}
     beyond = {number for number in begun if number >= saved}
     interrupted = beyond == {saved} and counted is not None and counted <= saved  # a crash: the next one's
-    firsts = sorted(groups.keys() | (begun - {saved} if interrupted else begun))
+    firsts = sorted({each.start for each in groups} | (begun - {saved} if interrupted else begun))
     count = max(saved, counted or 0, firsts[-1] + 1 if firsts else 0)
-    if count > 10 * len(firsts) + _GAP and count > 10 * sum(map(count_rows, groups.values())) + _GAP:
+    if count > 10 * len(firsts) + _GAP and count > 10 * sum(map(len, groups)) + _GAP:
         raise HandrailError(
             f"dataset {str(layout.root)!r}: meta/info.json or the name of a file says that there are {count}"
             " episodes, of which next to none are there; move it away"
@@ -109,30 +110,21 @@ def survey(layout: Layout, manifest: Manifest, sums: Checksums) -> Survey:
     return Survey(layout, states, totals, leftovers, unknown)
 
 
-def _heads(rows: Mapping[int, Path]) -> dict[int, Path]:
-    """Return the files of episode rows but for those whose episodes are in the one before."""
-    heads, end = dict[int, Path](), 0
+def _heads(rows: Mapping[int, Path]) -> dict[Path, range]:
+    """Return the files of episode rows with their episodes, but for those that are in the one before."""
+    heads, end = dict[Path, range](), 0
     for number, path in sorted(rows.items()):
         if number >= end:
-            heads[number], end = path, number + count_rows(path)
+            end = number + count_rows(path)
+            heads[path] = range(number, end)
     return heads
 
 
-def _inside(numbered: Mapping[Path, int], groups: Mapping[int, Path]) -> set[Path]:
+def _inside(numbered: Mapping[Path, int], groups: Sequence[range]) -> set[Path]:
     """Return the files named after an episode that is in the files of another: they are of no group."""
-    firsts = sorted(groups)
-    found = set[Path]()
-    for path, number in numbered.items():
-        place = bisect_right(firsts, number) - 1
-        if number not in groups and place >= 0:
-            first = firsts[place]
-            found |= {path} if number < first + count_rows(groups[first]) else set()
-    return found
-
-
-def _end(groups: Mapping[int, Path]) -> int:
-    """Return the number after the last episode that has a row of metadata."""
-    return max(groups) + count_rows(groups[max(groups)]) if groups else 0
+    firsts = [each.start for each in groups]
+    places = {path: bisect_right(firsts, number) - 1 for path, number in numbered.items()}
+    return {path for path, place in places.items() if place >= 0 and numbered[path] in groups[place][1:]}
 
 
 def _saved_in_info(layout: Layout) -> int | None:

@@ -139,12 +139,18 @@ def test_a_dataset_copied_in_part_is_named_as_such(root):
     check_is(root, [0, 1])
 
 
-def test_a_stray_file_that_lerobot_would_read_is_set_aside(root):
-    stray = root / "data" / "chunk-000" / "copy of file-000.parquet"
-    shutil.copy(Layout(root).data(0), stray)
+@pytest.mark.parametrize("of", ["data", "row"])
+@pytest.mark.parametrize("name", ["chunk-000/copy of file-000", "chunk-0000/file-000", "chunk-00٠/file-000"])
+def test_a_stray_file_that_lerobot_would_read_is_set_aside(root, of, name):
+    """The file of an episode has one name: another that means the same number is none of its files."""
+    path = getattr(Layout(root), of)(0)
+    stray = path.parents[1] / f"{name}.parquet"
+    stray.parent.mkdir(exist_ok=True)
+    shutil.copy(path, stray)
     report = repair(root)
     assert report.episodes == 4
     assert report.done[MOVED] == (stray.relative_to(root).as_posix(),)
+    assert repair(root).clean
     assert open_with_lerobot(root).num_episodes == 4
 
 
