@@ -24,7 +24,7 @@ from handrail.datasets.recording.folder import check_folders, clear_staging, fin
 from handrail.datasets.recording.rewrite import settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.survey import Survey, shortened, survey
-from handrail.datasets.storage.atomic import explained, remove, replace, sync_folder
+from handrail.datasets.storage.atomic import explained, remove, sync_folder, write_whole
 from handrail.datasets.storage.lock import DatasetLock
 
 REWRITTEN = "whole, but as another tool wrote them"  # a repair renews their checksums
@@ -84,7 +84,7 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
             for group in found.groups:
                 if group.rewritten and not all(group.faults):
                     row = layout.row(group.first)
-                    replace(row, with_checksums(row, group.rewritten), layout.staging)
+                    write_whole(row, with_checksums(row, group.rewritten), layout.staging)
             counted = found.totals.episodes == found.episodes
             done[REBUILT] = _rebuild(layout, manifest, found.totals) if counted else ()
             if found.damage and set_aside_damaged:
@@ -135,7 +135,7 @@ def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, .
             remove(path)
             sync_folder(path.parent)
         else:
-            replace(path, data, layout.staging)
+            write_whole(path, data, layout.staging)
     return tuple(rebuilt)
 
 

@@ -19,7 +19,14 @@ from handrail.datasets.format.metadata import ColumnTypes, Totals
 from handrail.datasets.recording.file_group import write_file_groups
 from handrail.datasets.recording.folder import clear_staging, foreign_files, next_damaged
 from handrail.datasets.recording.slice import EpisodeSlice
-from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, replace, sync_folder
+from handrail.datasets.storage.atomic import (
+    beside,
+    make_folder,
+    publish_folder,
+    remove,
+    sync_folder,
+    write_whole,
+)
 from handrail.datasets.storage.lock import DatasetLock
 
 _OURS = (*FOLDERS, STAGING)
@@ -60,7 +67,7 @@ def write_anew(
         summary = summary_files(draft, manifest, totals, encodings)
         for path, data in {draft.manifest: manifest.to_bytes(), **summary}.items():
             if data is not None:
-                replace(path, data, draft.staging)
+                write_whole(path, data, draft.staging)
         if in_place:
             _copy_folder(root, draft.root, _OURS)
             for name in foreign_files(Layout(root)):

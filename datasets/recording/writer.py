@@ -44,9 +44,9 @@ from handrail.datasets.storage.atomic import (
     move,
     reason,
     remove,
-    replace,
     sync_folder,
     write_synced,
+    write_whole,
 )
 from handrail.datasets.storage.lock import DatasetLock
 
@@ -102,8 +102,8 @@ class EpisodeWriter:
             lock = on_error.enter_context(DatasetLock(layout.staging))
             check_target(layout, overwrite)  # again: another recorder may have been faster
             clear_dataset(layout)
-            replace(layout.manifest, manifest.to_bytes(), layout.staging)
-            replace(layout.info, info_bytes(manifest, Totals()), layout.staging)
+            write_whole(layout.manifest, manifest.to_bytes(), layout.staging)
+            write_whole(layout.info, info_bytes(manifest, Totals()), layout.staging)
             on_error.pop_all()
         return cls(layout, manifest, Totals(), lock, types)
 

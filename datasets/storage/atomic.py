@@ -69,23 +69,19 @@ def make_folder(path: Path) -> None:
     sync_folder(path.parent)
 
 
-def replace(path: Path, data: bytes, staging: Path) -> None:
-    """Write or replace a file so that a reader sees the old one or the new one, whole."""
-    make_folder(path.parent)
-    staged = staging / path.name
-    write_synced(staged, data)
-    os.replace(staged, path)
-    sync_folder(path.parent)
+def write_whole(path: Path, data: bytes, staging: Path | None = None) -> None:
+    """Write or replace a file so that a reader sees the old one or the new one, whole.
 
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write or replace a file that has no staging folder; nothing else is left behind if that fails.
+    Args:
+        path: The file.
+        data: Its content.
+        staging: A folder of the same file system for what is not whole yet, which lies beside it without.
 
     Raises:
-        OSError: The disk is full, or the folder cannot be made or written.
+        OSError: The disk is full, or the folder cannot be made or written; nothing else is left behind.
     """
     make_folder(path.parent)
-    partial = beside(path, "partial")
+    partial = staging / path.name if staging else beside(path, "partial")
     try:
         write_synced(partial, data)
         os.replace(partial, path)
