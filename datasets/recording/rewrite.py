@@ -29,8 +29,6 @@ from handrail.datasets.storage.atomic import (
 )
 from handrail.datasets.storage.lock import DatasetLock
 
-_OURS = (*FOLDERS, STAGING)
-
 
 def write_anew(
     root: Path,
@@ -69,7 +67,7 @@ def write_anew(
             if data is not None:
                 write_whole(path, data, draft.staging)
         if in_place:
-            _copy_folder(root, draft.root, _OURS)
+            _copy_beside(root, draft.root)
             for name in foreign_files(Layout(root)):
                 if not (root / name).is_symlink():  # it may stand for a file of the old dataset
                     _second_name(root / name, draft.root / name)
@@ -136,15 +134,13 @@ def settle(root: Path) -> bool:
     return finished
 
 
-def _copy_folder(source: Path, target: Path, ours: Sequence[str] = ()) -> None:
-    """Copy a folder, but for some names in it."""
+def _copy_beside(root: Path, target: Path) -> None:
+    """Copy what lies beside a dataset's own folders."""
 
-    def ignored(folder: str, _: list[str]) -> Sequence[str]:
-        return ours if Path(folder) == source else ()
+    def ours(folder: str, _: list[str]) -> Sequence[str]:
+        return (*FOLDERS, STAGING) if Path(folder) == root else ()
 
-    shutil.copytree(
-        source, target, symlinks=True, ignore=ignored, copy_function=_second_name, dirs_exist_ok=True
-    )
+    shutil.copytree(root, target, symlinks=True, ignore=ours, copy_function=_second_name, dirs_exist_ok=True)
 
 
 def _second_name(source: str | Path, target: str | Path) -> None:
