@@ -163,7 +163,7 @@ class Shards:
 def _slices(job: Job, manifest: Manifest) -> Iterator[EpisodeSlice]:
     """Yield the episodes of a shard."""
     layout = Layout(job.arguments[1])
-    records = list(each_record(layout, with_stats=True))
+    records = list(each_record(layout))
     if len(records) != job.size:
         raise HandrailError(
             f"dataset {str(layout.root)!r}: expected {job.size} episodes, found {len(records)}"

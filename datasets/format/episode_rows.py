@@ -135,7 +135,6 @@ class EpisodeRows:
             files=self.files,
             file_index=file_index_of(said.chunk, said.file),
             offset=said.dataset_from_index - int(self.rows[0]["dataset_from_index"]),
-            alone=len(self) == 1,
         )
 
     def records(self, with_stats: bool = False) -> Iterator[EpisodeRecord]:
@@ -167,10 +166,10 @@ def row_files(layout: Layout) -> list[Path]:
     return sorted(layout.episodes.glob("*/*.parquet"))
 
 
-def each_record(layout: Layout, with_stats: bool = False) -> Iterator[EpisodeRecord]:
-    """Yield the episodes of a dataset that Handrail wrote, a group in memory at a time."""
+def each_record(layout: Layout) -> Iterator[EpisodeRecord]:
+    """Yield the episodes of a dataset that Handrail wrote, with statistics, a group in memory at a time."""
     for path in row_files(layout):
-        yield from EpisodeRows.read(path).records(with_stats)
+        yield from EpisodeRows.read(path).records(with_stats=True)
 
 
 def count_rows(path: Path) -> int:

@@ -66,8 +66,6 @@ class EpisodeRecord:
     """The first episode in its files, after which these are named."""
     offset: int = 0
     """How many frames in its files are before it."""
-    alone: bool = True
-    """Whether it is the only one in its files."""
 
 
 @dataclass(frozen=True)

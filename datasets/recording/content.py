@@ -29,14 +29,14 @@ def content_faults(path: Path, name: str, manifest: Manifest, rows: EpisodeRows)
         manifest: The schema.
         rows: The episode rows of its group.
     """
-    faults = []
+    faults, alone = [], len(rows) == 1  # then the file must hold nothing else
     with data_files() as files:
         for record in rows.records(with_stats=True):
             try:
                 if name.startswith("data/"):
-                    fault = _rows_fault(files.open(path), manifest, record)
+                    fault = _rows_fault(files.open(path), manifest, record, alone)
                 else:
-                    fault = _pictures_fault(path, name.split("/")[1], manifest, record)
+                    fault = _pictures_fault(path, name.split("/")[1], manifest, record, alone)
             except (HandrailError, *UNREADABLE) as error:
                 fault = first_line(error)
             faults.append(fault)
@@ -48,17 +48,17 @@ def first_line(error: BaseException) -> str:
     return str(error).partition("\n")[0]
 
 
-def _pictures_fault(path: Path, key: str, manifest: Manifest, record: EpisodeRecord) -> str:
-    stretch = (0, 0) if record.alone else (record.offset, manifest.fps)
+def _pictures_fault(path: Path, key: str, manifest: Manifest, record: EpisodeRecord, alone: bool) -> str:
+    stretch = (0, 0) if alone else (record.offset, manifest.fps)
     now = decoded_stats(path, record.length, manifest.features[key], *stretch)
     saved = (record.stats or {})[key]
     same = all(np.abs(now[name] - saved[name]).max() < _SHADE for name in ("mean", "std"))
     return "" if same else "it shows other pictures than were saved"
 
 
-def _rows_fault(file: DataFile, manifest: Manifest, record: EpisodeRecord) -> str:
+def _rows_fault(file: DataFile, manifest: Manifest, record: EpisodeRecord, alone: bool) -> str:
     """Return how rows that can be read differ from those that were saved, or ""."""
-    table = file.all() if record.alone else file.rows(record.episode, record.length)
+    table = file.all() if alone else file.rows(record.episode, record.length)
     lacking = [name for name in stored_features(manifest.features) if name not in table.column_names]
     if lacking or table.num_rows != record.length:
         return f"{table.num_rows} rows instead of {record.length}" + "".join(f", no {n}" for n in lacking[:1])
