@@ -113,11 +113,6 @@ class EpisodeRows:
     def __len__(self) -> int:
         return len(self.rows)
 
-    @property
-    def length(self) -> int:
-        """Number of frames of all its episodes."""
-        return sum(record.length for record in self.records())
-
     def record(self, place: int, with_stats: bool = False) -> EpisodeRecord:
         """Return the episode of one row, with its statistics if wanted.
 

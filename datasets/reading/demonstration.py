@@ -188,7 +188,7 @@ class Demonstration(Episode):
 
     def has(self, part: str) -> bool:
         """Return whether a part is there."""
-        return any(name in self.frames for name in self.columns.choices(part))
+        return bool(self._name(part))
 
     def column(self, part: str) -> np.ndarray:
         """Return the column that plays a part, as it is.
@@ -196,11 +196,9 @@ class Demonstration(Episode):
         Raises:
             DoesNotApply: There is none.
         """
-        choices = self.columns.choices(part)
-        for name in choices:
-            if name in self.frames:
-                return self.frames[name]
-        raise DoesNotApply(f"no column {' or '.join(map(repr, choices))}")
+        if not self.has(part):
+            raise DoesNotApply(f"no column {' or '.join(map(repr, self.columns.choices(part)))}")
+        return self.frames[self._name(part)]
 
     def numbers(self, part: str) -> FloatArray:
         """Return the numbers of a part as `(N, d)`, finite or not.
@@ -226,10 +224,11 @@ class Demonstration(Episode):
 
     def entries(self, part: str) -> tuple[str, ...]:
         """Return the names of a part's entries; none where the dataset names none."""
-        for name in self.columns.choices(part):
-            if name in self.frames:
-                return self.info.features[name].names or ()
-        return ()
+        return self.info.features[self._name(part)].names or () if self.has(part) else ()
+
+    def _name(self, part: str) -> str:
+        """Return the name of the column that plays a part, or ""."""
+        return next((name for name in self.columns.choices(part) if name in self.frames), "")
 
 
 def _rows(values: np.ndarray) -> FloatArray:
