@@ -14,6 +14,8 @@ import pyarrow.parquet as pq
 
 from handrail.datasets.format.schema import AUTOMATIC, Feature
 
+UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError, OverflowError)
+"""What reading a file of a dataset can raise."""
 _INDEX = {"name": None, "field_name": None, "pandas_type": "unicode", "numpy_type": "object"}
 _PANDAS_TASKS = {
     "index_columns": ["task"],

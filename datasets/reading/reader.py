@@ -22,14 +22,13 @@ from handrail.datasets.format.info_file import InfoFile, fill
 from handrail.datasets.format.layout import VIDEO_PATH, Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.schema import NUMBERS, Feature, features_of
-from handrail.datasets.format.tables import flat_numbers
+from handrail.datasets.format.tables import UNREADABLE, flat_numbers
 from handrail.datasets.reading.simulated import STATE, SUCCESS, kept_in_state, out_of_state
 from handrail.datasets.storage.atomic import beside
 from handrail.datasets.storage.strict_json import read_json
 
 _DAMAGED = " the dataset is damaged"
 _READABLE = (*NUMBERS, "float16", "string")
-_UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError)
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ def read_info(root: str | Path) -> DatasetInfo:
         content = read_json(layout.info)
         if not isinstance(content, dict):
             raise ValueError("no JSON object")
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         advice = f" handrail-edit repair {where} rebuilds it" if layout.manifest.is_file() else _DAMAGED
         raise _torn(layout.info, error, advice) from error
     version = str(content.get("codebase_version"))
@@ -99,7 +98,7 @@ def read_info(root: str | Path) -> DatasetInfo:
             video_path=said.video_path or VIDEO_PATH,
             from_handrail=layout.manifest.is_file(),
         )
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         raise _torn(layout.info, error) from error
 
 
@@ -118,7 +117,7 @@ def read_episodes(root: str | Path) -> list[dict[str, Any]]:
                 found = table_rows(file.read(columns=plain_names(file), use_threads=False))
             for row in found:
                 row["tasks"] = msgspec.convert(row, EpisodeRow).tasks or []
-        except _UNREADABLE as error:
+        except UNREADABLE as error:
             raise _torn(path, error) from error
         rows += found
     rows.sort(key=lambda row: row["episode_index"])
@@ -199,7 +198,7 @@ def read_rows_of(
             f"dataset {str(info.root)!r}: {path.relative_to(info.root)} of episode {number} is missing:"
             f" it was copied in part;{_advice(info)}"
         ) from error
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         raise _torn(path, error, _advice(info)) from error
     if table.num_rows != length:
         raise HandrailError(

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import DataFile, data_files
@@ -12,10 +11,9 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord
 from handrail.datasets.format.schema import AUTOMATIC
 from handrail.datasets.format.stats import column_stats
-from handrail.datasets.format.tables import column_values, stored_features
+from handrail.datasets.format.tables import UNREADABLE, column_values, stored_features
 from handrail.datasets.format.video import decoded_stats
 
-UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError, OverflowError)
 _KEPT = ("min", "max", "mean", "std")
 _SHADE = 0.03  # of full brightness: how far encoding anew may move the mean of a colour
 

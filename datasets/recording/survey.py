@@ -16,8 +16,9 @@ from handrail.datasets.format.layout import Layout, episode_of
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import Checksum, EpisodeRecord, Totals
 from handrail.datasets.format.schema import video_keys
+from handrail.datasets.format.tables import UNREADABLE
 from handrail.datasets.recording.checksums import Checksums
-from handrail.datasets.recording.content import UNREADABLE, content_faults, first_line
+from handrail.datasets.recording.content import content_faults, first_line
 from handrail.datasets.storage.strict_json import read_json
 
 _SHOWN = 3  # faults in one line
