@@ -34,6 +34,20 @@ def open_regular(path: Path) -> BufferedReader:
     return open(regular(path), "rb")
 
 
+def read_regular(path: Path, most: int) -> bytes:
+    """Return the content of a regular file of at most so many bytes.
+
+    Raises:
+        OSError: It is not there, cannot be read, or is no regular file.
+        ValueError: It is larger.
+    """
+    with open_regular(path) as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"expected at most {most >> 20} MB, got more")
+    return data
+
+
 def is_inside(path: Path, folder: Path) -> bool:
     """Return whether a path lies in a folder, wherever links lead; one that leads to itself stays there."""
     return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))

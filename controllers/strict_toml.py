@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.controllers.regular_file import open_regular
+from handrail.controllers.regular_file import read_regular
 
 MOST_BYTES = 2**20
 
@@ -18,11 +18,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         what: it is, for the error: `robot description`.
     """
     try:
-        with open_regular(path) as file:
-            data = file.read(MOST_BYTES + 1)
-        if len(data) > MOST_BYTES:
-            raise HandrailError(f"{what} {path}: expected at most {MOST_BYTES >> 10} kB")
-        return tomllib.loads(data.decode())
+        return tomllib.loads(read_regular(path, MOST_BYTES).decode())
     except RecursionError as error:
         raise HandrailError(f"{what} {path}: not valid TOML: nested too deeply") from error
     except (OSError, ValueError) as error:

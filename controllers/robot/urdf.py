@@ -8,7 +8,7 @@ from importlib import metadata
 from pathlib import Path, PurePosixPath
 
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.controllers.regular_file import is_inside, open_regular, regular
+from handrail.controllers.regular_file import is_inside, read_regular, regular
 from handrail.controllers.robot.parts import Arm
 
 _MOST_BYTES = 16 * 2**20
@@ -127,10 +127,9 @@ def mesh_files(urdf: Path, folder: Path) -> Iterator[Path]:
 
 def _parsed(urdf: Path) -> ET.Element:
     try:
-        with open_regular(urdf) as file:
-            data = file.read(_MOST_BYTES + 1)
-        if len(data) > _MOST_BYTES or b"<!DOCTYPE" in data:
-            raise ValueError(f"expected at most {_MOST_BYTES >> 20} MB of XML, and no DOCTYPE")
+        data = read_regular(urdf, _MOST_BYTES)
+        if b"<!DOCTYPE" in data:
+            raise ValueError("expected XML, and no DOCTYPE")
         return ET.fromstring(data)
     except (OSError, ValueError, ET.ParseError, RecursionError) as error:
         raise HandrailError(f"URDF {urdf}: {message_of(error)}") from error

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError, message_of, shown
-from handrail.controllers.regular_file import open_regular
+from handrail.controllers.regular_file import read_regular
 from handrail.controllers.typed import decoded
 from handrail.datasets.statistics.contrast import Measure
 
@@ -59,11 +59,7 @@ def read_scores(path: Path) -> tuple[Score, ...]:
 
 
 def _rows(path: Path) -> Iterator[Score]:
-    with open_regular(path) as file:
-        data = file.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise ValueError(f"expected at most {MOST_BYTES >> 20} MB, got more")
-    rows = csv.reader(io.StringIO(data.decode("utf-8-sig")), strict=True)
+    rows = csv.reader(io.StringIO(read_regular(path, MOST_BYTES).decode("utf-8-sig")), strict=True)
     columns = next(rows, [])
     if columns not in (COLUMNS, [*COLUMNS, SOURCE]):
         raise ValueError(f"expected the columns {','.join(COLUMNS)}, got {shown(','.join(columns))}")

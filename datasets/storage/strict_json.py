@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.controllers.regular_file import open_regular
+from handrail.controllers.regular_file import read_regular
 from handrail.datasets.storage.atomic import write_whole
 
 MOST_BYTES = 16 * 1024 * 1024
@@ -22,8 +22,7 @@ def read_json(path: Path, most: int = MOST_BYTES) -> Any:
         OSError: It is not there, cannot be read, or is no regular file.
         ValueError: `parse_json` refuses it; one line.
     """
-    with open_regular(path) as file:
-        return parse_json(file.read(most + 1), most)
+    return parse_json(read_regular(path, most), most)
 
 
 def load_json(path: Path, what: str, most: int = MOST_BYTES) -> Any:
