@@ -139,7 +139,7 @@ class ShapePairs:
         try:
             given = np.ctypeslib.as_array(placements, (2, 12))
             poses = [coal.Transform3s(each[:9].reshape(3, 3).copy(), each[9:].copy()) for each in given]
-            first, second = (_coal_shape(self._placed[index].shape) for index in self._pair(pair))
+            first, second = (coal_shape(self._placed[index].shape) for index in self._pair(pair))
             found = coal.DistanceResult()
             coal.distance(first, poses[0], second, poses[1], coal.DistanceRequest(), found)
             points = found.getNearestPoint1(), found.getNearestPoint2()
@@ -177,7 +177,8 @@ def _placed(obstacle: Obstacle) -> PlacedShape:
     return PlacedShape(obstacle.name, obstacle.frame or _WORLD, obstacle.shape, placement)
 
 
-def _coal_shape(shape: Shape) -> coal.ShapeBase:
+def coal_shape(shape: Shape) -> coal.ShapeBase:
+    """Return a shape as coal has it."""
     make = {"box": coal.Box, "capsule": coal.Capsule, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
     return make[shape.kind](*(float(length) for length in shape.size))
 

@@ -9,6 +9,7 @@ import pinocchio as pin
 from scipy.optimize import minimize
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
+from handrail.controllers.collision.shape_pairs import coal_shape
 from handrail.controllers.modelling.clouds import LinkCloud
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.parts import PlacedShape
@@ -17,7 +18,6 @@ _INSIDE = 0.005  # of a shape that the middle of a link's triangle may stick out
 _NESTED = 0.5  # share of configurations
 _STRIDE = 10  # from one configuration to the next that is looked at
 _TRIES = 300  # distances that are measured on the way to a meeting
-_COAL = {"box": coal.Box, "capsule": coal.Capsule, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
 
 
 class Meetings:
@@ -44,7 +44,7 @@ class Meetings:
         self._shapes, self._meshes = pin.GeometryModel(), pin.GeometryModel()
         for placed in model.description.collision:
             joint, at = model.mount(placed)
-            shape = _COAL[placed.shape.kind](*map(float, placed.shape.size))
+            shape = coal_shape(placed.shape)
             self._shapes.addGeometryObject(pin.GeometryObject(placed.name, joint, at, shape))
             own = [cloud.triangles for cloud in clouds if cloud.joint == joint]
             triangles = np.vstack([*own, np.empty((0, 3, 3))])

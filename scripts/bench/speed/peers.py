@@ -11,6 +11,7 @@ from scipy import sparse
 
 from handrail.collect.world.mink import MinkController
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.shape_pairs import coal_shape
 from handrail.controllers.core.library import Memory, functions
 from handrail.controllers.errors import imported
 from handrail.controllers.interface.channels import Channels
@@ -143,18 +144,14 @@ def _pink(loop: TimingLoop) -> Take:
 
 def _geometry(loop: TimingLoop, update: Update) -> pin.GeometryModel:
     """Return the shapes of a robot and its scene, and the same pairs, the floor left out."""
-    import coal
-
-    kinds = {"box": coal.Box, "capsule": coal.Capsule, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
     around = [
         PlacedShape(each.name, "universe", each.shape, Placement(each.position, each.rotation))
         for each in update.obstacles
     ]
     found, index = pin.GeometryModel(), {}
     for placed in (*loop.model.description.collision, *around):
-        joint, placement = loop.model.mount(placed)
-        shape = kinds[placed.shape.kind](*placed.shape.size.tolist())
-        index[placed.name] = found.addGeometryObject(pin.GeometryObject(placed.name, joint, placement, shape))
+        thing = pin.GeometryObject(placed.name, *loop.model.mount(placed), coal_shape(placed.shape))
+        index[placed.name] = found.addGeometryObject(thing)
     for first, second in update.problem.collision.pairs:
         if second in index:
             found.addCollisionPair(pin.CollisionPair(index[first], index[second]))
