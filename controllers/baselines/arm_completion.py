@@ -70,12 +70,11 @@ class WeldedBaseCompletion:
 
     Args:
         model: of the robot.
-        damping: λ of the arm.
     """
 
-    def __init__(self, model: RobotModel, damping: float = 0.05) -> None:
+    def __init__(self, model: RobotModel) -> None:
         self._model = model
-        self._arm = ArmCompletion(model, damping)
+        self._arm = ArmCompletion(model)
         self._mobile = bool(model.description.base.joints)
 
     def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:

@@ -9,9 +9,11 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.core.library import Memory, functions
 from handrail.controllers.robot.model import Pose, RobotModel, joint_memory
 
+_USUAL = 1e-4  # largest error that is good enough [m, rad]
+
 
 def arm_configuration(
-    model: RobotModel, q: FloatArray, goal: Pose, tolerance: float = 1e-4
+    model: RobotModel, q: FloatArray, goal: Pose, tolerance: float = _USUAL
 ) -> tuple[FloatArray, float]:
     """Return the configuration near q whose arm has the tool at the goal, (n,), and the error that is left.
 
@@ -27,11 +29,9 @@ def arm_configuration(
     return _configuration(model, q, goal, tolerance, len(model.description.base.joints))
 
 
-def body_configuration(
-    model: RobotModel, q: FloatArray, goal: Pose, tolerance: float = 1e-4
-) -> tuple[FloatArray, float]:
+def body_configuration(model: RobotModel, q: FloatArray, goal: Pose) -> tuple[FloatArray, float]:
     """Return the same with a base that moves too: where it would stand, and the arm there, (n,)."""
-    return _configuration(model, q, goal, tolerance, 0)
+    return _configuration(model, q, goal, _USUAL, 0)
 
 
 def hands_configuration(model: RobotModel, q: FloatArray, goals: Sequence[Pose]) -> tuple[FloatArray, float]:
@@ -41,7 +41,7 @@ def hands_configuration(model: RobotModel, q: FloatArray, goals: Sequence[Pose])
     first = max(len(description.base.joints), 1 + int(np.max(shared, initial=-1)))
     errors = []
     for hand, goal in zip(description.hands, goals, strict=True):
-        q, error = _configuration(model.with_hand(hand.name), q, goal, 1e-4, first)
+        q, error = _configuration(model.with_hand(hand.name), q, goal, _USUAL, first)
         errors.append(error)
     return q, max(errors)
 
