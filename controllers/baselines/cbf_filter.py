@@ -6,10 +6,9 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.reactive import ReactiveController
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.usual_frames import in_usual_frames
+from handrail.controllers.interface.usual_frames import commanded_rows
 from handrail.controllers.robot.model import RobotModel
 
 ALPHA = 1.0
@@ -69,11 +68,8 @@ class CbfFilter(ReactiveController):
         if not len(others):
             asked = np.clip(np.where(intent.mask[joints], intent.values[joints], 0.0), -fastest, fastest)
             return np.diag(weights), -weights * asked
-        usual = in_usual_frames(intent, self._model, q)
-        if usual is None:
-            raise HandrailError("CBF filter: expected all axes of a turned frame, got some of them")
-        matrix = channel_matrix(self._model, self.channels, q)[usual.mask]
-        return matrix.T @ matrix + _DAMPING * np.diag(weights), -matrix.T @ usual.values[usual.mask]
+        matrix, asked = commanded_rows(intent, self._model, q)
+        return matrix.T @ matrix + _DAMPING * np.diag(weights), -matrix.T @ asked
 
     def _barriers(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return rows `gradients u ≥ lower` of the R near pairs at q, (R, n) and (R,).

@@ -6,11 +6,10 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion
 from handrail.controllers.baselines.reactive import ReactiveController
 from handrail.controllers.baselines.twist_completion import base_velocity, damped_least_squares, tool_twist
-from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.interface.usual_frames import commanded_rows
 from handrail.controllers.robot.model import RobotModel
 
 _DAMPING = 0.01  # λ, as in WholeBodyCompletion
@@ -26,13 +25,10 @@ def unprotected_controller(model: RobotModel, period: float = 0.05) -> ReactiveC
         model: of the robot.
         period: of the control loop [s].
     """
-    channels = Channels.of(model.description)
     inverse = model.description.limits.velocity**2 / _DAMPING  # of λ W², (n,)
 
     def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
-        matrix = channel_matrix(model, channels, state.q)[intent.mask]  # (c, n)
-        asked = _world_values(model, channels, state, intent)[intent.mask]
-        return damped_least_squares(matrix, asked, inverse)
+        return damped_least_squares(*commanded_rows(intent, model, state.q), inverse)
 
     return ReactiveController(model, ask, period)
 
@@ -58,14 +54,3 @@ def split_controller(model: RobotModel, period: float = 0.05) -> ReactiveControl
         return arm.velocity(state.q, previous, base, twist, period)
 
     return ReactiveController(model, ask, period, understood=understood)
-
-
-def _world_values(model: RobotModel, channels: Channels, state: State, intent: Intent) -> FloatArray:
-    """Return the values in the frames of the channels' matrix, (m,)."""
-    values = intent.values.copy()
-    for hand, each in enumerate(model.description.hands):
-        tool = model.pose(state.q, each.named("tool"))
-        values[channels.hand_slice(hand)] = tool_twist(intent, channels, tool, hand)
-    if channels.base and intent.frames.base == "world":
-        values[channels.base_slice] = turned(base_velocity(intent, channels, state.q), -state.q[2])
-    return values

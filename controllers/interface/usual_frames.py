@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
@@ -12,6 +14,19 @@ from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
 _USUAL = Frames()
+
+
+def commanded_rows(intent: Intent, model: RobotModel, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return C and u of `C v = u`, the commanded channels at q, (c, n) and (c,), in whatever frames.
+
+    Raises:
+        HandrailError: A mask cannot be turned, see `in_usual_frames`.
+    """
+    usual = in_usual_frames(intent, model, q)
+    if usual is None:
+        raise HandrailError("intent: expected all axes of a turned frame, got some of them")
+    matrix = channel_matrix(model, Channels.of(model.description), q)
+    return matrix[usual.mask], usual.values[usual.mask]
 
 
 def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent | None:

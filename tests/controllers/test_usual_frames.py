@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 from arbiter_helpers import ONE, TWO, channels_of
 
+from handrail.controllers.baselines.cbf_filter import CbfFilter
+from handrail.controllers.baselines.unprotected import unprotected_controller
 from handrail.controllers.interface.channel_matrix import channel_matrix
+from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.usual_frames import in_usual_frames
@@ -89,6 +92,33 @@ def test_what_only_its_own_frame_can_say_has_no_answer(robot, frames, lacks):
         in_usual_frames(Intent(np.zeros(channels.size), mask, frames=frames), model, np.ones(model.size))
         is None
     )
+
+
+@both
+@pytest.mark.parametrize("build", [unprotected_controller, CbfFilter])
+def test_controllers_of_any_mask_do_the_same_in_any_frame(robot, build):
+    """And brake where only its own frame can say what is asked."""
+    model, rng = ROBOTS[robot][0], np.random.default_rng(7)
+    controller, channels = build(model), channels_of(model)
+
+    def sent(asked):
+        controller.reset()
+        command = controller.update(State(model.description.home, np.zeros(model.size), 1.0), asked)
+        return command.velocities[1], command.diagnostics.status.brakes
+
+    for _ in range(5):
+        frames = Frames("world", "tool", 0.3 * rng.uniform(-1, 1, 3))
+        mask = whole_parts(rng, channels, frames.point)
+        asked = Intent(
+            np.where(mask, rng.uniform(-0.1, 0.1, channels.size), 0.0), mask, time=1.0, frames=frames
+        )
+        usual = in_usual_frames(asked, model, model.description.home)
+        assert usual is not None
+        (velocity, brakes), (expected, _) = sent(asked), sent(usual)
+        assert not brakes
+        assert np.allclose(velocity, expected, atol=1e-9)
+    sideways = channels.mask(f"{channels.hands[-1][0].split('.')[0]}.vy")
+    assert sent(Intent(0.1 * sideways, sideways, time=1.0, frames=Frames(tool="tool")))[1]
 
 
 @pytest.mark.parametrize(
