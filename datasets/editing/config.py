@@ -1,6 +1,5 @@
 """Settings of `handrail-edit`, a class for each verb that writes episodes; light to import."""
 
-import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ import tyro
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Words
+from handrail.datasets.storage.atomic import followed
 
 MANY = 500  # episodes in files of their own
 
@@ -36,7 +36,7 @@ class EditConfig:
     @property
     def root(self) -> Path:
         """The folder of the dataset."""
-        return _absolute(self.folder)
+        return followed(self.folder)
 
     @property
     def target(self) -> Path:
@@ -154,7 +154,7 @@ class PackConfig:
     @property
     def roots(self) -> tuple[Path, ...]:
         """The folders of the datasets."""
-        return (_absolute(self.folder),)
+        return (followed(self.folder),)
 
     @property
     def target(self) -> Path:
@@ -182,7 +182,7 @@ class MergeConfig:
         """The folders of the datasets."""
         if len(self.folders) < 2:
             raise HandrailError(f"merge: expected two folders or more, got {len(self.folders)}")
-        return tuple(_absolute(folder) for folder in self.folders)
+        return tuple(followed(folder) for folder in self.folders)
 
     @property
     def target(self) -> Path:
@@ -207,12 +207,8 @@ def packing_advice(root: Path) -> str:
     return ""
 
 
-def _absolute(folder: str) -> Path:
-    return Path(os.path.realpath(Path(folder).expanduser()))  # a link stays, what it leads to is edited
-
-
 def _apart(output: str, *roots: Path) -> Path:
-    target = _absolute(output)
+    target = followed(output)
     for root in roots:
         if root in target.parents or target in root.parents:
             raise HandrailError(f"--output {output}: expected a folder apart from {root}")

@@ -1,6 +1,5 @@
 """Datasets from episodes of others, in files of many episodes, in one pass: every edit is such a copy."""
 
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -20,7 +19,7 @@ from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import shared_features
 from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
-from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.atomic import explained, followed
 from handrail.datasets.storage.strict_json import known_json
 
 _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
@@ -84,7 +83,7 @@ def merge_datasets(
         name: Of the new dataset, `owner/name`; that of the first folder when empty.
         verify: Read every file of the datasets anew, also those that have not changed since the last check.
     """
-    target, *given = (Path(os.path.realpath(Path(root).expanduser())) for root in (output, *roots))
+    target, *given = map(followed, (output, *roots))
     if twice := [str(root) for root in given if given.count(root) > 1]:
         raise HandrailError(f"merge: expected each folder once, got {twice[0]!r} twice")
     places = [root for root in given if root == target or not _is_empty(root)] or given
@@ -99,7 +98,7 @@ def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]
         root: Its folder; removed too if no episode is left.
         dropped: Says by an episode's row of metadata whether it goes.
     """
-    root = Path(os.path.realpath(Path(root).expanduser()))  # a link alone would leave what it leads to
+    root = followed(root)
     with explained(f"cannot write {str(root)!r}"):
         settle(root)  # what was cut short is done; dropping the same again does no harm
         if _is_empty(root):

@@ -8,7 +8,6 @@ rebuilt if they are not, to the byte, what the episodes say.
     handrail-edit repair path/to/dataset
 """
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +23,7 @@ from handrail.datasets.recording.folder import check_folders, clear_staging, fin
 from handrail.datasets.recording.rewrite import settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.survey import Survey, shortened, survey
-from handrail.datasets.storage.atomic import explained, remove, sync_folder, write_whole
+from handrail.datasets.storage.atomic import explained, followed, remove, sync_folder, write_whole
 from handrail.datasets.storage.lock import DatasetLock
 
 REWRITTEN = "whole, but as another tool wrote them"  # a repair renews their checksums
@@ -72,7 +71,7 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
         root: The dataset's folder.
         set_aside_damaged: Whether episodes that are not whole go to the quarantine; without, they are named.
     """
-    layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
+    layout = Layout(followed(root))
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
         settle(layout.root)
         manifest = read_manifest(layout)

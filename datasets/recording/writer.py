@@ -40,6 +40,7 @@ from handrail.datasets.recording.repair import RepairReport, tidy_locked
 from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.storage.atomic import (
     explained,
+    followed,
     make_folder,
     move,
     reason,
@@ -94,7 +95,7 @@ class EpisodeWriter:
             overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
             types: Of the extra columns; the first episode fixes them without.
         """
-        layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
+        layout = Layout(followed(root))
         manifest.check()
         with explained(f"cannot create dataset {str(layout.root)!r}"), contextlib.ExitStack() as on_error:
             settle(layout.root)
@@ -117,7 +118,7 @@ class EpisodeWriter:
                 session and are kept with each of its episodes.
             verify: Read every file anew, also those that have not changed since they were last checked.
         """
-        layout = Layout(Path(os.path.realpath(Path(root).expanduser())))
+        layout = Layout(followed(root))
         words = f"--resume: cannot add to dataset {str(layout.root)!r}"
         with explained(words), contextlib.ExitStack() as on_error:
             settle(layout.root)

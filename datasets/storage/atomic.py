@@ -26,6 +26,11 @@ def reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
+def followed(path: str | Path) -> Path:
+    """Return where a path leads: what is behind a link is changed, and the link stays."""
+    return Path(os.path.realpath(Path(path).expanduser()))
+
+
 def beside(path: Path, ending: str) -> Path:
     """Return the hidden name of what is not finished, beside a file or a folder."""
     if not path.name:
