@@ -6,6 +6,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from handrail.datasets.format.info_file import fill
 from handrail.datasets.format.join import Videos
 from handrail.datasets.format.schema import video_keys
@@ -21,10 +23,15 @@ def digest_of_dataset(root: Path) -> str:
         info, rows = dataset.info, dataset.rows
         names = [name for name, each in info.features.items() if name not in CLOCKS and each.dtype != "video"]
         for row in rows:
-            for name, values in sorted(dataset.frames(row["episode_index"], names).items()):
-                digest.update(f"{name} {values.shape} ".encode())
-                digest.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
+            add_frames(digest, dataset.frames(row["episode_index"], names))
     return digest.hexdigest()[:16] + digest_of_pictures(info, rows)
+
+
+def add_frames(digest: Any, frames: Mapping[str, np.ndarray]) -> None:
+    """Add every value of an episode's columns to a digest."""
+    for name, values in sorted(frames.items()):
+        digest.update(f"{name} {values.shape} ".encode())
+        digest.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
 
 
 def digest_of_pictures(info: DatasetInfo, rows: Iterable[Mapping[str, Any]]) -> str:

@@ -8,7 +8,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.episode_rows import count_rows
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.reading.digest import CLOCKS, digest_of_pictures
+from handrail.datasets.reading.digest import CLOCKS, add_frames, digest_of_pictures
 from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
 
 _PLACES = ("index", "episode_index")  # where an episode is in its dataset
@@ -29,15 +29,13 @@ def saved_in(root: Path, first: int = 0) -> Saved:
     info, found = read_info(root), {}
     names = [
         name
-        for name, each in sorted(info.features.items())
+        for name, each in info.features.items()
         if name not in (*CLOCKS, *_PLACES) and each.dtype not in ("video", "image")
     ]
     with data_files() as files:
         for row in read_episodes(root):
             digest = hashlib.sha256()
-            for name, values in sorted(read_rows_of(info, row, names, files).items()):
-                digest.update(f"{name} {values.shape} ".encode())
-                digest.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
+            add_frames(digest, read_rows_of(info, row, names, files))
             digest.update(digest_of_pictures(info, [row]).encode())
             found[first + row["episode_index"]] = digest.hexdigest()[:16]
     return found
