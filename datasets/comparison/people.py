@@ -227,7 +227,7 @@ def _limits(
 def people_report(comparison: PeopleComparison) -> Report:
     """Return the report of a comparison of people."""
     study, baseline = comparison.study, comparison.baseline
-    source, scopes = {"source": study.source}, dict.fromkeys(each.scope for each in comparison.values)
+    scopes = dict.fromkeys(each.scope for each in comparison.values)
     tables = [table for scope in scopes for table in comparison.tables(scope)]
     content = {
         "format": FORMAT,
@@ -243,11 +243,11 @@ def people_report(comparison: PeopleComparison) -> Report:
         tables=tables,
         sections=[("", [table]) for table in tables],
         how=_HOW,
-        content=source | content,
+        content=content,
         values=comparison.values,
         contrasts=comparison.contrasts,
-        units={"trials.csv": [source | _row(trial) for trial in comparison.trials]},
-        source=source,
+        units={"trials.csv": [_row(trial) for trial in comparison.trials]},
+        source={"source": study.source},
     )
 
 

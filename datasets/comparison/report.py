@@ -152,7 +152,7 @@ class Report:
     values: Sequence[Value]
     contrasts: Sequence[Contrast]
     units: Mapping[str, Rows] = field(default_factory=dict)  # of CSV files, a row for each unit
-    source: Mapping[str, Any] = field(default_factory=dict)  # of the numbers, in each row of differences.csv
+    source: Mapping[str, Any] = field(default_factory=dict)  # of the numbers, in the JSON and each row of CSV
 
     @property
     def cautions(self) -> list[str]:
@@ -175,15 +175,16 @@ class Report:
     def json(self) -> str:
         """Content, values and contrasts."""
         numbers = {"values": self.values, "contrasts": self.contrasts}
-        whole = {**self.content, "headline": self.headline, "cautions": self.cautions}
+        whole = {**self.source, **self.content, "headline": self.headline, "cautions": self.cautions}
         whole |= {name: [each.content for each in found] for name, found in numbers.items()}
         return json.dumps(_plain(whole), indent=1, allow_nan=False) + "\n"
 
     def write(self, folder: Path, name: str = "report.json") -> list[Path]:
         """Write page, JSON and CSV files into a folder, made if it is not there; return the files."""
-        tables = {**self.units, "differences.csv": [{**self.source, **each.row} for each in self.contrasts]}
+        tables = {**self.units, "differences.csv": [each.row for each in self.contrasts]}
         texts = {"report.html": self.html, name: self.json}
-        texts |= {file: csv_text(_plain(rows)) for file, rows in tables.items() if rows}
+        tables = {file: [{**self.source, **row} for row in rows] for file, rows in tables.items() if rows}
+        texts |= {file: csv_text(_plain(rows)) for file, rows in tables.items()}
         with explained(f"--output {str(folder)!r}: expected a folder that can be written"):
             for file, text in texts.items():
                 write_whole(folder / file, text.encode())
