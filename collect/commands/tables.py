@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.presentation.wording import number
+from handrail.datasets.presentation.wording import DASH, number, yes_no
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.summary import CHATTERING, UNKNOWN, summarize
+from handrail.datasets.quality.summary import CHATTERING, summarize
 from handrail.datasets.quality.takeover import TAKE_OVER
 from handrail.datasets.quality.worst import Ranked
 from handrail.datasets.reading.load import recorded_episodes
@@ -51,28 +51,25 @@ def takeover_table(root: Path) -> Table | None:
     if not episodes or INTERVENTION not in episodes[0].info.features:
         return None
     found = measure({"": episodes}, np.random.default_rng(0), metrics=TAKE_OVER).values
-    units = {each.name: f" [{each.unit}]" if each.unit else "" for each in TAKE_OVER}
     rows = [
         [str(episode.number), *(number(found[each.name][""].values[place]) for each in TAKE_OVER)]
         for place, episode in enumerate(episodes)
     ]
     means = ["mean", *(number(found[each.name][""].estimate) for each in TAKE_OVER)]
-    return Table(("episode", *(each.title + units[each.name] for each in TAKE_OVER)), [*rows, means])
+    return Table(("episode", *(each.heading for each in TAKE_OVER)), [*rows, means])
 
 
 def worst_table(root: Path, metric: Metric, worst: Sequence[Ranked]) -> Table:
     """Return a table of the worst episodes, the worst first."""
-    name = f"{metric.title} [{metric.unit}]" if metric.unit else metric.title
-    said = {None: UNKNOWN, True: "yes", False: "no"}
     rows = [
         [
             str(each.episode.number),
             number(each.value),
-            said[each.episode.success],
-            str(each.episode.meta.get("failure_reason") or UNKNOWN),
+            yes_no(each.episode.success),
+            str(each.episode.meta.get("failure_reason") or DASH),
             f"{each.episode.seconds:.1f}",
         ]
         for each in worst
     ]
     caption = f"{metric.meaning}; {metric.good} is better"
-    return Table(("episode", name, "success", "why not", "length [s]"), rows, str(root), caption)
+    return Table(("episode", metric.heading, "success", "why not", "length [s]"), rows, str(root), caption)

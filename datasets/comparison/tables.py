@@ -143,7 +143,7 @@ def _worst(comparison: Comparison, group: Group, metric: Metric) -> list[Cell | 
     order = ranked(group.episodes, metric, values)
     if len({each.value for each in order}) < 2:
         return []  # nothing is worse than anything else
-    worst, unit = order[:_WORST], f" [{metric.unit}]" if metric.unit else ""
+    worst = order[:_WORST]
     told = ", ".join(f"{each.episode.number} ({number(each.value)})" for each in worst)
     numbers = [each.episode.number for each in worst]
-    return [Cell(metric.title + unit, "", metric.meaning), told, deletion(group.info, numbers)]
+    return [Cell(metric.heading, "", metric.meaning), told, deletion(group.info, numbers)]

@@ -7,6 +7,11 @@ THESE_POLICIES = "these policies 95 %"  # in other scenes
 WITH_TRAINING = "with training 95 %"  # trained again, from other seeds, too
 
 
+def yes_no(answer: bool | None) -> str:
+    """Return an answer, or a dash."""
+    return {None: DASH, True: "yes", False: "no"}[answer]
+
+
 def number(value: float | None) -> str:
     """Return a number with three digits that count, or a dash."""
     if value is None or not math.isfinite(value):

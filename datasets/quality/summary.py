@@ -8,6 +8,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.format.metadata import CLIENT
+from handrail.datasets.presentation.wording import DASH, yes_no
 from handrail.datasets.quality import motion, safety
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
@@ -15,7 +16,6 @@ from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.load import each_demonstration
 
-UNKNOWN = "–"
 CHATTERING = ("rate of change", "high-frequency content", "corrections")  # a table of its own
 ASKED, OWNED = "teleop.values", "teleop.mask"
 
@@ -43,10 +43,10 @@ class EpisodeSummary:
         """Return the line as text, by heading."""
         return {
             "episode": str(self.episode),
-            "task": self.task or UNKNOWN,
-            "mode": self.mode or UNKNOWN,
-            "success": {None: UNKNOWN, True: "yes", False: "no"}[self.success],
-            "why not": self.failure_reason or UNKNOWN,
+            "task": self.task or DASH,
+            "mode": self.mode or DASH,
+            "success": yes_no(self.success),
+            "why not": self.failure_reason or DASH,
             "length [s]": f"{self.length:.1f}",
             "smallest distance [m]": _number(self.smallest_distance, ".3f"),
             "smoothness": _number(self.smoothness, ".2f"),
@@ -115,4 +115,4 @@ def _known(value: float) -> float | None:
 
 
 def _number(value: float | None, pattern: str) -> str:
-    return UNKNOWN if value is None else format(value, pattern)
+    return DASH if value is None else format(value, pattern)

@@ -41,6 +41,11 @@ class Measure:
     good: str = ""  # "higher" or "lower" where everything else being equal that is better
     meaning: str = ""  # one sentence
 
+    @property
+    def heading(self) -> str:
+        """The title with the unit, if there is one."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
+
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
