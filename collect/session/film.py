@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from handrail.collect.world.env import HandrailEnv
 from handrail.datasets.recording.frames import Frame
-from handrail.datasets.storage.atomic import beside, explained, sync_file, sync_folder, write_whole
+from handrail.datasets.storage.atomic import beside, explained, sync, write_whole
 
 _font = cache(ImageFont.load_default)
 SIZE = (540, 960)  # height, width [px]
@@ -55,9 +55,9 @@ class VideoFile:
                     self._container.mux(self._stream.encode(None))
                 self._container.close()
                 if error is None:
-                    sync_file(self._partial)
+                    sync(self._partial)
                     os.replace(self._partial, self._path)
-                    sync_folder(self._path.parent)
+                    sync(self._path.parent)
         finally:
             self._partial.unlink(missing_ok=True)
 

@@ -25,7 +25,7 @@ from handrail.controllers.typed import Text, decoded
 from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.rewrite import settle
-from handrail.datasets.storage.atomic import explained, remove, sync_folder, write_whole
+from handrail.datasets.storage.atomic import explained, remove, sync, write_whole
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.datasets.storage.strict_json import load_json, write_json
 
@@ -141,7 +141,7 @@ class StudyFolder:
         place = self._participants / name
         with explained(f"cannot remove {str(place)!r}"):
             os.replace(place, self._forgotten)
-            sync_folder(self._participants)
+            sync(self._participants)
             remove(self._forgotten)
 
     def settle(self) -> None:

@@ -22,7 +22,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import Statistics, image_levels, image_stats
-from handrail.datasets.storage.atomic import sync_file
+from handrail.datasets.storage.atomic import sync
 
 QUEUE_LENGTH = 64  # pictures; 3 MB at 128 x 128, 59 MB at 640 x 480
 GROUP, QUALITY, PRESET = 2, 23, "ultrafast"  # key frame every second picture: random access stays cheap
@@ -172,7 +172,7 @@ class VideoEncoder:
         found = count_frames(self._path)
         if found != expected:
             raise HandrailError(f"encoder of {self._path.name}: expected {expected} pictures, got {found}")
-        sync_file(self._path)
+        sync(self._path)
         return image_stats(self._levels)
 
     def cancel(self) -> None:

@@ -23,7 +23,7 @@ from handrail.datasets.recording.folder import check_folders, clear_staging, fin
 from handrail.datasets.recording.rewrite import settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.survey import Survey, shortened, survey
-from handrail.datasets.storage.atomic import explained, followed, remove, sync_folder, write_whole
+from handrail.datasets.storage.atomic import explained, followed, remove, sync, write_whole
 from handrail.datasets.storage.lock import DatasetLock
 
 REWRITTEN = "whole, but as another tool wrote them"  # a repair renews their checksums
@@ -115,7 +115,7 @@ def _clear(found: Survey) -> dict[str, tuple[str, ...]]:
     for path in found.leftovers:
         remove(path)
     for folder in {path.parent for path in found.leftovers}:
-        sync_folder(folder)
+        sync(folder)
     layout = found.layout
     removed = (*clear_staging(layout), *map(layout.relative, found.leftovers))
     moved = tuple(quarantine(layout, found.unknown))
@@ -132,7 +132,7 @@ def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, .
         rebuilt.append(layout.relative(path))
         if data is None:
             remove(path)
-            sync_folder(path.parent)
+            sync(path.parent)
         else:
             write_whole(path, data, layout.staging)
     return tuple(rebuilt)

@@ -19,14 +19,7 @@ from handrail.datasets.format.metadata import ColumnTypes, Totals
 from handrail.datasets.recording.file_group import write_file_groups
 from handrail.datasets.recording.folder import clear_staging, foreign_files, next_damaged
 from handrail.datasets.recording.slice import EpisodeSlice
-from handrail.datasets.storage.atomic import (
-    beside,
-    make_folder,
-    publish_folder,
-    remove,
-    sync_folder,
-    write_whole,
-)
+from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, sync, write_whole
 from handrail.datasets.storage.lock import DatasetLock
 
 
@@ -110,7 +103,7 @@ def remove_whole(root: Path) -> None:
     """Remove a dataset, at once: cut short, `settle` goes on."""
     remove(_draft(root))
     os.replace(root, _draft(root))
-    sync_folder(root.parent)
+    sync(root.parent)
     remove(_draft(root))
 
 
@@ -128,7 +121,7 @@ def settle(root: Path) -> bool:
             if finished and not root.exists():
                 os.replace(draft.root if drafted else old, root)
                 lock.moved(Layout(root).staging)
-                sync_folder(root.parent)
+                sync(root.parent)
             remove(old)
             remove(draft.root)
     return finished

@@ -45,7 +45,7 @@ from handrail.datasets.storage.atomic import (
     move,
     reason,
     remove,
-    sync_folder,
+    sync,
     write_synced,
     write_whole,
 )
@@ -199,10 +199,10 @@ class EpisodeWriter:
         self._episode = OpenEpisode(self._layout, self._manifest)
         self._unusable = ""
         with explained(f"episode {number} is saved, but the summary files are late; `repair` rebuilds them"):
-            sync_folder(self._layout.row(number).parent)
+            sync(self._layout.row(number).parent)
             for path in (self._layout.info, self._layout.stats):
                 os.replace(self._layout.staging / path.name, path)
-            sync_folder(self._layout.info.parent)
+            sync(self._layout.info.parent)
         return number
 
     def discard_episode(self) -> None:

@@ -51,18 +51,13 @@ def write_synced(path: Path, data: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def sync_file(path: Path, flags: int = os.O_RDONLY) -> None:
-    """Wait until the disk has a file that something else has written, or a folder, opened with some flags."""
-    descriptor = os.open(path, flags | os.O_NONBLOCK)  # a named pipe would wait
+def sync(path: Path) -> None:
+    """Wait until the disk has a file that something else has written, or the names in a folder."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # a named pipe would wait
     try:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def sync_folder(path: Path) -> None:
-    """Wait until the disk has the names in a folder."""
-    sync_file(path, os.O_RDONLY | os.O_DIRECTORY)
 
 
 def make_folder(path: Path) -> None:
@@ -71,7 +66,7 @@ def make_folder(path: Path) -> None:
         return
     make_folder(path.parent)
     path.mkdir(exist_ok=True)
-    sync_folder(path.parent)
+    sync(path.parent)
 
 
 def write_whole(path: Path, data: bytes, staging: Path | None = None) -> None:
@@ -93,7 +88,7 @@ def write_whole(path: Path, data: bytes, staging: Path | None = None) -> None:
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
-    sync_folder(path.parent)
+    sync(path.parent)
 
 
 def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
@@ -110,14 +105,14 @@ def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
         OSError: The disk does not take it, or somebody else has made a folder of that name meanwhile.
     """
     for path in (draft, *draft.rglob("*")):
-        sync_file(path)
+        sync(path)
     old = beside(final, "old")
     if replacing:
         remove(old)
         if final.exists():
             os.replace(final, old)
     os.replace(draft, final)
-    sync_folder(final.parent)
+    sync(final.parent)
     remove(old)
 
 
@@ -125,7 +120,7 @@ def move(source: Path, target: Path) -> None:
     """Rename a file into another folder of the same file system, durably."""
     make_folder(target.parent)
     os.replace(source, target)
-    sync_folder(target.parent)
+    sync(target.parent)
 
 
 def remove(path: Path) -> None:
