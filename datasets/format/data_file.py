@@ -13,8 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from handrail.controllers.regular_file import regular
-from handrail.datasets.format.tables import numbers, to_numpy
+from handrail.datasets.format.tables import numbers, open_parquet, to_numpy
 
 _EPISODE = "episode_index"
 _SEARCHED = [_EPISODE, "index"]  # columns whose statistics readers look rows up by
@@ -81,7 +80,7 @@ class DataFile:
             OSError, pyarrow.ArrowException, ValueError: It is not there, not whole, or has no episodes.
         """
         self.path = path
-        self._file = pq.ParquetFile(regular(path), page_checksum_verification=True)
+        self._file = open_parquet(path)
         self._spans = _episode_spans(self._file.metadata)
         self._last: tuple[list[int], list[str] | None, pa.Table] | None = None  # what was read last
 

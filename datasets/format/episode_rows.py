@@ -32,7 +32,15 @@ from handrail.datasets.format.stats import (
     stats_from_lists,
     stats_to_lists,
 )
-from handrail.datasets.format.tables import flat_numbers, lists, numbers, parquet_bytes, plain_values, scalars
+from handrail.datasets.format.tables import (
+    flat_numbers,
+    lists,
+    numbers,
+    open_parquet,
+    parquet_bytes,
+    plain_values,
+    scalars,
+)
 from handrail.datasets.storage.strict_json import parse_json
 
 _FILES = b"handrail"  # key in the metadata of the parquet: sizes and hashes of the group's files
@@ -91,7 +99,7 @@ class EpisodeRows:
             ForeignRowError: The file is whole, but another tool wrote it.
             OSError, pyarrow.ArrowException, ValueError, KeyError: The file is not whole, or has no row.
         """
-        with pq.ParquetFile(regular(path), page_checksum_verification=True) as file:
+        with open_parquet(path) as file:
             marks = file.schema_arrow.metadata or {}
             if _FILES not in marks:
                 raise ForeignRowError(
@@ -252,7 +260,7 @@ def with_checksums(path: Path, files: Mapping[str, Checksum]) -> bytes:
 
 
 def _read(path: Path) -> pa.Table:
-    with pq.ParquetFile(regular(path), page_checksum_verification=True) as file:
+    with open_parquet(path) as file:
         return file.read(use_threads=False)
 
 

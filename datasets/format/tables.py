@@ -6,12 +6,14 @@ is here does not.
 
 import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.schema import AUTOMATIC, Feature
 
 UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError, OverflowError)
@@ -25,6 +27,11 @@ _PANDAS_TASKS = {
         for name, kind, numpy_kind in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
     ],
 }
+
+
+def open_parquet(path: Path) -> pq.ParquetFile:
+    """Open a regular file of rows; a page with another checksum than its own is refused, see `UNREADABLE`."""
+    return pq.ParquetFile(regular(path), page_checksum_verification=True)
 
 
 def numbers(values: Any, kind: pa.DataType) -> pa.Array:

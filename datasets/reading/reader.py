@@ -12,17 +12,15 @@ from typing import Any
 import msgspec
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.controllers.regular_file import regular
 from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.format.episode_rows import EpisodeRow, plain_names, row_files, table_rows
 from handrail.datasets.format.info_file import InfoFile, fill
 from handrail.datasets.format.layout import VIDEO_PATH, Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.schema import NUMBERS, Feature, features_of
-from handrail.datasets.format.tables import UNREADABLE, flat_numbers
+from handrail.datasets.format.tables import UNREADABLE, flat_numbers, open_parquet
 from handrail.datasets.reading.simulated import STATE, SUCCESS, kept_in_state, out_of_state
 from handrail.datasets.storage.atomic import beside
 from handrail.datasets.storage.strict_json import read_json
@@ -113,7 +111,7 @@ def read_episodes(root: str | Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for path in row_files(Layout(info.root)):
         try:
-            with pq.ParquetFile(regular(path), page_checksum_verification=True) as file:
+            with open_parquet(path) as file:
                 found = table_rows(file.read(columns=plain_names(file), use_threads=False))
             for row in found:
                 row["tasks"] = msgspec.convert(row, EpisodeRow).tasks or []
