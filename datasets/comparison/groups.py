@@ -11,8 +11,8 @@ import numpy as np
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.demonstration import Demonstration, Episode
-from handrail.datasets.reading.load import each_opened, recorded_episodes
-from handrail.datasets.reading.reader import DatasetInfo, read_info
+from handrail.datasets.reading.load import each_opened, some_recorded
+from handrail.datasets.reading.reader import DatasetInfo
 
 FEWEST, MOST = 2, 8
 
@@ -81,9 +81,7 @@ def load_groups(
     """
     groups: list[Group] = []
     for root, name in zip(roots, _names(roots, labels), strict=True):
-        info, episodes = read_info(root), recorded_episodes(root, columns)
-        if not episodes:
-            raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
+        episodes = some_recorded(root, columns)
         prefix = f"{name} · " if len(roots) > 1 else ""
         values = (
             [prefix + value for value in _values(episodes, by, str(root))] if by else [name] * len(episodes)
@@ -91,7 +89,7 @@ def load_groups(
         members: dict[str, list[Episode]] = {}
         for episode, value in zip(episodes, values, strict=True):
             members.setdefault(value, []).append(episode)
-        groups += [Group(label, info, tuple(each)) for label, each in members.items()]
+        groups += [Group(label, episodes[0].info, tuple(each)) for label, each in members.items()]
     if not FEWEST <= len(groups) <= MOST:
         found = ", ".join(group.label for group in groups) or "none"
         advice = "" if by else "; name another dataset, or say --by mode"

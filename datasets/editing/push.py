@@ -24,7 +24,7 @@ from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.check import check_whole
-from handrail.datasets.reading.load import recorded_episodes
+from handrail.datasets.reading.load import some_recorded
 from handrail.datasets.reading.reader import open_dataset, read_info
 from handrail.datasets.storage.atomic import explained, write_whole
 
@@ -216,9 +216,7 @@ def _write_card(root: Path, repo_id: str, license_id: str) -> str:
 
 def _description(root: Path) -> str:
     """Return what was recorded, as Markdown: counts, modes, operators, success and metrics."""
-    episodes = recorded_episodes(root)
-    if not episodes:
-        raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
+    episodes = some_recorded(root)
     info, metas = episodes[0].info, [episode.meta for episode in episodes]
     frames = sum(episode.count for episode in episodes)
     counted = {name: _counted([meta.get(name) for meta in metas]) for name in _COUNTED}

@@ -13,7 +13,7 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.reading.demonstration import Episode
-from handrail.datasets.reading.load import recorded_episodes
+from handrail.datasets.reading.load import some_recorded
 from handrail.datasets.reading.reader import DatasetInfo
 
 RANKING = {metric.name: metric for metric in METRICS if metric.good}
@@ -42,9 +42,7 @@ def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]
     """Return the worst episodes of any LeRobot v3.0 dataset, the worst first."""
     if count < 1:
         raise HandrailError(f"--count {count}: expected 1 or more")
-    episodes = recorded_episodes(root)
-    if not episodes:
-        raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
+    episodes = some_recorded(root)
     measured = measure({"": episodes}, np.random.default_rng(0), metrics=[metric]).values[metric.name][""]
     if measured.estimate is None:
         raise HandrailError(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.demonstration import Demonstration, Episode
@@ -40,6 +41,13 @@ def recorded_episodes(root: str | Path, columns: ColumnNames | None = None) -> l
     columns, info = columns or ColumnNames(), read_info(root)
     wanted, rows = _wanted(info, columns), with_success(info, read_episodes(root))
     return [Recorded(row["episode_index"], info, row, columns, wanted) for row in rows]
+
+
+def some_recorded(root: str | Path, columns: ColumnNames | None = None) -> list[Recorded]:
+    """Return what `recorded_episodes` returns, one episode or more."""
+    if episodes := recorded_episodes(root, columns):
+        return episodes
+    raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
 
 
 def each_opened(episodes: Iterable[Episode]) -> Iterator[Demonstration]:

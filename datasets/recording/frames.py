@@ -91,7 +91,7 @@ OWNER, INTERVENTION, MASK = "owner", "intervention", "teleop.mask"
 SHARED_COLUMNS = (
     Column(OWNER, "int64", lambda frame: _owners(frame.intent), "asked"),
     Column(INTERVENTION, "bool", lambda frame: bool(np.any(_owners(frame.intent) >= BY_PERSON))),
-    Column("policy.values", "float32", lambda frame: _wanted(frame.intent), "asked"),
+    Column("policy.values", "float32", lambda frame: _asked(_of_policy(frame.intent)), "asked"),
     Column("policy.age", "float32", lambda frame: _finite_number(_of_policy(frame.intent).raw.age)),
 )
 """What is recorded besides where a policy steers beside a person."""
@@ -189,10 +189,6 @@ def _of_policy(intent: Intent) -> Intent:
     source = intent.source(POLICY) if isinstance(intent, Intents) and intent.time > LONG_AGO else None
     nothing = Intent(np.zeros(len(intent.mask)), np.zeros(len(intent.mask), bool))
     return (source.intent if source else nothing).of_hands(len(intent.grippers))
-
-
-def _wanted(intent: Intent) -> FloatArray:
-    return _asked(_of_policy(intent))
 
 
 def _raw(intent: Intent) -> FloatArray:
