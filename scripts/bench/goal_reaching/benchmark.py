@@ -55,7 +55,6 @@ def benchmark(
         baselines: all that there are, by name.
         console: to show how far it is, and what was left out.
     """
-    config.check()
     present, skipped = available(baselines, config)
     for name, reason in skipped.items():
         console.print(f"without {name}: {reason}")
