@@ -1,8 +1,8 @@
 """Lists on a command line: by comma or space alike."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.constructors import PrimitiveConstructorSpec
 
@@ -26,40 +26,28 @@ def _split_word(word: str) -> list[str]:
     return parts
 
 
+def _listed(
+    kind: type, word: str, read: Callable[[list[str]], Any], words: Callable[[Any], list[str]]
+) -> PrimitiveConstructorSpec[Any]:
+    """Return how a list of any length is read from words, and said in words again."""
+    return PrimitiveConstructorSpec(
+        "*", f"[{word} [{word} …]]", read, lambda value: isinstance(value, kind), words
+    )
+
+
 def _whole_numbers(words: Sequence[str]) -> tuple[int, ...]:
     return tuple(int(word) for word in split_list(words))
 
 
-_MANY = "[WORD [WORD …]]"
+def _joined(words: Sequence[str]) -> str:
+    return ",".join(split_list(words))
 
-Words = Annotated[
-    tuple[str, ...],
-    PrimitiveConstructorSpec[tuple[str, ...]](
-        "*", _MANY, split_list, is_instance=lambda value: isinstance(value, tuple), str_from_instance=list
-    ),
-]
+
+Words = Annotated[tuple[str, ...], _listed(tuple, "WORD", split_list, list)]
 """A list of words."""
-
 Numbers = Annotated[
-    tuple[int, ...],
-    PrimitiveConstructorSpec[tuple[int, ...]](
-        "*",
-        "[INT [INT …]]",
-        _whole_numbers,
-        is_instance=lambda value: isinstance(value, tuple),
-        str_from_instance=lambda numbers: [str(number) for number in numbers],
-    ),
+    tuple[int, ...], _listed(tuple, "INT", _whole_numbers, lambda value: list(map(str, value)))
 ]
 """A list of whole numbers."""
-
-Names = Annotated[
-    str,
-    PrimitiveConstructorSpec[str](
-        "*",
-        _MANY,
-        lambda words: ",".join(split_list(words)),
-        is_instance=lambda value: isinstance(value, str),
-        str_from_instance=lambda names: [names],
-    ),
-]
+Names = Annotated[str, _listed(str, "WORD", _joined, lambda value: [value])]
 """A list of names, kept as one text with commas between them."""
