@@ -20,8 +20,8 @@ class ControllerSpec:
     """Whether `build` also takes what robot and task bring, `(model, period, objectives)`."""
 
 
-def _mpc(kind: str, **settings: float) -> Callable[..., Any]:
-    """Return what builds a kind of the masked MPC, `module:name`, with some settings of its own."""
+def _mpc(name: str, kind: str, help: str, **settings: float) -> ControllerSpec:
+    """Return the spec of a kind of the masked MPC, `module:name`, with some settings of its own."""
 
     def build(model: Any, period: float, objectives: tuple[Any, ...]) -> Any:
         from handrail.controllers.ocp.settings import MpcSettings
@@ -31,7 +31,7 @@ def _mpc(kind: str, **settings: float) -> Callable[..., Any]:
         mpc.settings.check_period(period, "control rate [Hz]")
         return mpc
 
-    return build
+    return ControllerSpec(name, build, help, protects=True, objectives=True)
 
 
 _HERE = "handrail.controllers"
@@ -39,20 +39,15 @@ CONTROLLERS = Registry(
     "controller",
     ControllerSpec,
     (
-        ControllerSpec("mpc", _mpc("masked_mpc:MaskedMpc"), "the masked MPC", protects=True, objectives=True),
-        ControllerSpec(
-            "blended",
-            _mpc("blended:BlendedMpc"),
-            "the masked MPC of an operator and an actor that knows the goal",
-            protects=True,
-            objectives=True,
+        _mpc("mpc", "masked_mpc:MaskedMpc", "the masked MPC"),
+        _mpc(
+            "blended", "blended:BlendedMpc", "the masked MPC of an operator and an actor that knows the goal"
         ),
-        ControllerSpec(
+        _mpc(
             "mpc_one_stage",
-            _mpc("masked_mpc:MaskedMpc", horizon=1),
+            "masked_mpc:MaskedMpc",
             "the masked MPC without its horizon: one stage",
-            protects=True,
-            objectives=True,
+            horizon=1,
         ),
         ControllerSpec("direct", f"{_HERE}.baselines.direct:DirectController", "clipped to joint limits"),
         ControllerSpec(
