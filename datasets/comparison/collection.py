@@ -24,15 +24,12 @@ def collected(group: Group, scope: str, rng: np.random.Generator | None = None) 
     count, seconds = len(group.episodes), group.seconds
     if (successes := group.successes) is None:
         return [Value(measure=each, **names, reason=_UNKNOWN) for each in (SUCCESS, HOURLY)]
-    share: dict[str, Any] = {
-        "estimate": successes / count,
-        "interval": wilson(successes, count),
-        "counts": (count,),
-    }
-    hourly: dict[str, Any] = {"estimate": 3600.0 * successes / seconds, "counts": (count,)}
-    if rng and count >= FEWEST:
-        hourly["interval"] = bootstrap(_numbers(group), _rate, True, rng)
-    return [Value(measure=SUCCESS, **names, **share), Value(measure=HOURLY, **names, **hourly)]
+    names["counts"] = (count,)
+    likely = bootstrap(_numbers(group), _rate, True, rng) if rng and count >= FEWEST else None
+    return [
+        Value(measure=SUCCESS, **names, estimate=successes / count, interval=wilson(successes, count)),
+        Value(measure=HOURLY, **names, estimate=3600.0 * successes / seconds, interval=likely),
+    ]
 
 
 def shared_seeds(one: Group, other: Group) -> list[tuple[int, int]]:
