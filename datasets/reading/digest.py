@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from handrail.datasets.format.info_file import fill
 from handrail.datasets.format.join import Videos
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.reading.reader import DatasetInfo, open_dataset
@@ -53,10 +52,8 @@ def digest_of_pictures(info: DatasetInfo, rows: Iterable[Mapping[str, Any]]) -> 
 
 def video_of(info: DatasetInfo, row: Mapping[str, Any], camera: str) -> tuple[Path, int]:
     """Return the file of a camera's pictures of an episode, and which of them is the episode's first."""
-    chunk, file, start = (
-        row[f"videos/{camera}/{name}"] for name in ("chunk_index", "file_index", "from_timestamp")
-    )
-    return info.root / fill(info.video_path, chunk, file, camera), round(start * info.fps)
+    start = row[f"videos/{camera}/from_timestamp"]
+    return info.root / info.video_file(row, camera), round(start * info.fps)
 
 
 def _encoded(
