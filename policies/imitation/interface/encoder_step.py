@@ -16,7 +16,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import decoded
 from handrail.policies.imitation.interface.encoder import Encoder, Reads
-from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.trust import ENCODE
 
@@ -51,11 +51,9 @@ class PolicyEncoderStep(OwnStep):
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
         """Return the observation with what the pictures say."""
-        shown, reads = dict(transition.get(TransitionKey.OBSERVATION) or {}), self.encoder.reads
-        sizes = len(reads.interface.state_names), len(reads.interface.environment_names)
-        if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
-            shown[STATE] = shown[STATE][..., : sizes[0]]
-        states, device = numbers_of(shown, STATE, sizes[0], ENCODE), shown[STATE].device
+        reads, names = self.encoder.reads, self.encoder.reads.interface
+        shown = apart(transition, names)
+        states, device = numbers_of(shown, STATE, len(names.state_names), ENCODE), shown[STATE].device
         pictures = {
             name: shown[key].detach().cpu().reshape(-1, *shown[key].shape[-3:])
             for name in reads.cameras
@@ -67,7 +65,7 @@ class PolicyEncoderStep(OwnStep):
         moments = zip(self._memories, range(len(states)), strict=False)
         rows = np.stack([memory.take(said, moment) for memory, moment in moments])
         around = torch.as_tensor(rows, device=device)
-        shown[ENVIRONMENT] = around.reshape(*shown[STATE].shape[:-1], sizes[1])
+        shown[ENVIRONMENT] = around.reshape(*shown[STATE].shape[:-1], rows.shape[1])
         return changed(transition, TransitionKey.OBSERVATION, shown)
 
     def _forget(self, times: object) -> None:
@@ -90,6 +88,18 @@ class PolicyEncoderStep(OwnStep):
         """Forget what was seen."""
         self._memories: list[SceneMemory] = []
         self._times = np.zeros(0)
+
+
+def apart(transition: EnvTransition, interface: PolicyInterface) -> dict[str, Any]:
+    """Return an observation with robot and scene apart.
+
+    A robot of LeRobot's, such as `handrail_sim`, shows them as one vector, `observation.state`.
+    """
+    shown = dict(transition.get(TransitionKey.OBSERVATION) or {})
+    sizes = [len(interface.state_names), len(interface.environment_names)]
+    if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
+        shown[STATE], shown[ENVIRONMENT] = torch.split(shown[STATE], sizes, dim=-1)
+    return shown
 
 
 def changed(transition: EnvTransition, key: TransitionKey, value: Any) -> EnvTransition:
