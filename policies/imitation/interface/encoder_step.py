@@ -10,11 +10,11 @@ import torch
 from lerobot.configs import PipelineFeatureType, PolicyFeature
 from lerobot.lerobot_types import EnvTransition, TransitionKey
 from lerobot.processor import ProcessorStep, ProcessorStepRegistry
-from lerobot.utils.constants import OBS_IMAGES
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import decoded
+from handrail.datasets.recording.frames import PICTURE
 from handrail.policies.imitation.interface.encoder import Encoder, Reads
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
@@ -57,7 +57,7 @@ class PolicyEncoderStep(OwnStep):
         pictures = {
             name: shown[key].detach().cpu().reshape(-1, *shown[key].shape[-3:])
             for name in reads.cameras
-            if isinstance(shown.get(key := f"{OBS_IMAGES}.{name}"), torch.Tensor)
+            if isinstance(shown.get(key := PICTURE + name), torch.Tensor)
         }
         said = self.encoder.look(pictures, states)
         self._memories += [SceneMemory(reads) for _ in states[len(self._memories) :]]

@@ -17,6 +17,7 @@ from safetensors.torch import load_model
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.recording.frames import PICTURE
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import encoder_of
@@ -66,7 +67,7 @@ class TrainedPolicy:
         }
         for camera, picture in (images or {}).items():
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
-            batch[f"observation.images.{camera}"] = pixels[None].float() / 255.0
+            batch[PICTURE + camera] = pixels[None].float() / 255.0
         batch["task"] = [task]
         try:
             with torch.inference_mode():
