@@ -13,7 +13,8 @@ from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import decoded
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.training.presets import as_json, resolved
+from handrail.policies.imitation.interface.checkpoint import as_json
+from handrail.policies.imitation.training.presets import resolved
 from handrail.policies.study.design import MOST_DRAWS, StudyDesign, Way, check_known
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 

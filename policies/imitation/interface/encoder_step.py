@@ -1,8 +1,7 @@
 """An encoder as a step of LeRobot's processors, inside a checkpoint: who loads it needs no more."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import decoded
 from handrail.datasets.recording.frames import PICTURE
+from handrail.policies.imitation.interface.checkpoint import as_json
 from handrail.policies.imitation.interface.encoder import Encoder, Reads
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
@@ -111,7 +111,7 @@ def changed(transition: EnvTransition, key: TransitionKey, value: Any) -> EnvTra
 
 def encoder_step(encoder: Encoder) -> PolicyEncoderStep:
     """Return the step of an encoder."""
-    step = PolicyEncoderStep(json.loads(json.dumps(asdict(encoder.reads))))
+    step = PolicyEncoderStep(as_json(encoder.reads))
     step.encoder = encoder
     return step
 

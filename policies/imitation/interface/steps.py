@@ -7,7 +7,6 @@ pictures
 ```
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -31,7 +30,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.typed import Name, decoded
-from handrail.policies.imitation.interface.checkpoint import MIXED, Fps
+from handrail.policies.imitation.interface.checkpoint import MIXED, Fps, as_json
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import (
     OwnStep,
@@ -250,7 +249,7 @@ def with_steps(
     """
     if interface is None:
         return before, after
-    described = json.loads(json.dumps(asdict(interface)))
+    described = as_json(interface)
     view, steps = PolicyViewStep(described), list(before.steps)
     normalisers = [i for i, step in enumerate(steps) if isinstance(step, NormalizerProcessorStep)]
     first = normalisers[0] if normalisers else len(steps)

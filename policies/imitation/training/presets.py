@@ -1,10 +1,9 @@
 """Sizes of policies that suit a CPU or a GPU, and LeRobot's configuration of a policy; both as they began."""
 
-import json
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from safetensors import SafetensorError
@@ -12,7 +11,7 @@ from safetensors import SafetensorError
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.datasets.storage.strict_json import parse_json
 from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
-from handrail.policies.imitation.interface.checkpoint import PolicyMeta, TrainingSizes
+from handrail.policies.imitation.interface.checkpoint import PolicyMeta, TrainingSizes, as_json
 from handrail.policies.imitation.interface.trust import registered_policies
 
 if TYPE_CHECKING:
@@ -128,11 +127,6 @@ def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
         if now.get(name) != then.get(name):
             words = f"expected {then.get(name)} as the training began"
             raise HandrailError(f"--resume with {name} {now.get(name)}: {words}")
-
-
-def as_json(settings: Any) -> Mapping[str, Any]:
-    """Return the fields of a dataclass as they come back from a file."""
-    return json.loads(json.dumps(asdict(settings)))
 
 
 def _value(text: str) -> Any:
