@@ -55,7 +55,7 @@ rollouts = 50                   under each condition
 draws = 1                       the first so many
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Annotated, Literal
@@ -64,7 +64,7 @@ from msgspec import Meta
 
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.typed import AtLeastOne, Count
 
 MOST_DRAWS = 1000
@@ -229,10 +229,3 @@ class StudyDesign:
             if not each.round_minutes or each.sizes:
                 found = f"got sizes {each.sizes}" if each.sizes else "found none"
                 raise HandrailError(f"{where}: expected round_minutes of task {task}, {found}")
-
-
-def check_known(what: str, names: Iterable[str], choices: Iterable[str]) -> None:
-    """Check that names are among the choices."""
-    for name in names:
-        if name not in choices:
-            raise unknown_name(what, name, choices)

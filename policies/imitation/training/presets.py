@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from safetensors import SafetensorError
 
-from handrail.controllers.errors import HandrailError, message_of, unknown_name
+from handrail.controllers.errors import HandrailError, check_known, message_of
 from handrail.datasets.storage.strict_json import parse_json
 from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta, TrainingSizes, as_json
@@ -71,14 +71,11 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     from handrail.policies.imitation.interface.compute import device_of
 
     choices, sizes = registered_policies(), resolved(config)
-    if config.policy not in choices:
-        raise unknown_name("policy", config.policy, choices)
+    check_known("policy", (config.policy,), choices)
     known = {entry.name for entry in fields(choices[config.policy])}
     if config.lr and "optimizer_lr" not in known:
         raise HandrailError(f"--lr: the policy {config.policy} has none; give its own with --policy_options")
-    for key in sizes.options:
-        if key not in known:
-            raise unknown_name(f"setting of the policy {config.policy}", key, known)
+    check_known(f"setting of the policy {config.policy}", sizes.options, known)
     device = device_of(config.device or ("cuda" if config.preset == "gpu" else "cpu"))
     wanted = {"pretrained_backbone_weights": None, "push_to_hub": False, "device": device}
     wanted |= {"optimizer_lr": sizes.lr, "optimizer_lr_backbone": sizes.lr} if sizes.lr else {}
