@@ -60,14 +60,13 @@ class PolicyOperator:
         self._policy, self._mode, self._task = policy, meta.mode, env.task.description
         self._interface = meta.interface or RecordedColumns(checkpoint)
         self._unusable = Intent(np.full(size, np.nan), np.ones(size, bool))
-        self._memory = SceneMemory(policy.encoder.reads) if policy.encoder else None
         self._period = period
         self.malformed = 0
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
-        if self._memory:
-            self._memory.forget()
+        if self._policy.encoder:
+            self._memory = SceneMemory(self._policy.encoder.reads)
         self.malformed = 0
         self.replan()
 
@@ -80,9 +79,8 @@ class PolicyOperator:
         """Return the intent now."""
         seen = view.observation
         state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
-        if self._memory and self._policy.encoder:
-            seen_now = {name: each[None] for name, each in pictures.items()}
-            said = self._policy.encoder.look(seen_now, state[None])
+        if encoder := self._policy.encoder:
+            said = encoder.look({name: each[None] for name, each in pictures.items()}, state[None])
             around = self._memory.take(said, 0)
         if self._period and view.state.time > self._asked + 1.5 * self._period:
             self._policy.skip(round((view.state.time - self._asked) / self._period) - 1)

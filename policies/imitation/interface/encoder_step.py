@@ -72,9 +72,9 @@ class PolicyEncoderStep(OwnStep):
         """Forget where an episode begins: where the time is not later."""
         if isinstance(times, torch.Tensor):
             before, self._times = self._times, times.detach().cpu().numpy().ravel()
-            for memory, now, then in zip(self._memories, self._times, before, strict=False):
+            for row, now, then in zip(range(len(self._memories)), self._times, before, strict=False):
                 if now <= then:
-                    memory.forget()
+                    self._memories[row] = SceneMemory(self.encoder.reads)
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return the encoder's weights."""
