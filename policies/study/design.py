@@ -180,15 +180,14 @@ class StudyDesign:
             raise HandrailError(f"study {self.name}: encoders: {words}, got {', '.join(self.encoders)}")
         if self.rounds:
             self._check_rounds(self.rounds)
-        once: dict[str, tuple[str, ...]] = {"modes": self.modes}
-        draws: dict[str, int] = {}
+        beside = self.beside or Beside()
         check_known(
             "mode of a pair", (mode for each in self.pairs for mode in (each.one, each.other)), self.modes
         )
         pairs = [(each.one, each.other, each.budget) for each in self.pairs]
         if len(set(pairs)) < len(pairs) or any(one == other for one, other, _ in pairs):
             raise HandrailError(f"study {self.name}: pairs: expected two modes each, once, got {pairs}")
-        counted = self.beside if self.beside and self.beside.same_number == self.draws else Beside()
+        counted = beside if beside.same_number == self.draws else Beside()
         numbered = counted.numbered or (self.modes if counted.same_number else ())
         by_number = (mode for *two, budget in pairs if budget == "number" for mode in two)
         check_known("mode of a pair by number, which same_number has in all draws", by_number, numbered)
@@ -196,11 +195,11 @@ class StudyDesign:
         if any(updates % self.curve[0] or updates >= most for updates in self.curve):
             words = f"expected multiples of the first below {most} updates"
             raise HandrailError(f"study {self.name}: curve {words}, got {self.curve}")
-        if beside := self.beside:
-            completed = [mode for mode in self.modes if mode in MODES and MODES[mode].controller == "mpc"]
-            check_known("mode of same_number", beside.numbered, self.modes)
-            check_known("mode of intents, which the MPC completes", beside.intents, completed)
-            draws |= {"beside.draws": beside.draws, "beside.same_number": beside.same_number}
+        completed = [mode for mode in self.modes if mode in MODES and MODES[mode].controller == "mpc"]
+        check_known("mode of same_number", beside.numbered, self.modes)
+        check_known("mode of intents, which the MPC completes", beside.intents, completed)
+        once = {"modes": self.modes}
+        draws = {"beside.draws": beside.draws, "beside.same_number": beside.same_number}
         if robust := self.robustness:
             once["robustness"] = (*robust.perturbations, *robust.protections)
             draws["robustness.draws"] = robust.draws
