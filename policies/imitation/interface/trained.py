@@ -96,17 +96,17 @@ class TrainedPolicy:
         return getattr(self.policy, "_action_queue", queues.get(ACTION, deque()))
 
 
-def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
+def load_policy(folder: str | Path) -> TrainedPolicy:
     """Load a policy from a `pretrained_model` folder, a checkpoint, or a training's folder (the last one).
 
-    Whoever made it, loading it runs no code of theirs (`trust.py`).
+    It computes on the CPU. Whoever made it, loading it runs no code of theirs (`trust.py`).
     """
     place = model_folder(Path(folder).expanduser())
     meta = read_meta(place) if (place / NAME).is_file() else None
     settings = check_policy_folder(place)
-    kind, override = settings.pop("type"), {"device_processor": {"device": device}}
+    kind, override = settings.pop("type"), {"device_processor": {"device": "cpu"}}
     try:
-        config = draccus.decode(registered_policies()[kind], settings | {"device": device})
+        config = draccus.decode(registered_policies()[kind], settings | {"device": "cpu"})
         policy = get_policy_class(kind).from_pretrained(place, config=config, strict=True)
         around = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
