@@ -67,3 +67,10 @@ def shown(value: object) -> str:
 def unknown_name(thing: str, name: object, choices: Iterable[str]) -> HandrailError:
     """Return the error for a name that is none of the choices."""
     return HandrailError(f"unknown {thing} {shown(name)}: expected one of {', '.join(sorted(choices))}")
+
+
+def check_known(thing: str, names: Iterable[object], choices: Collection[Any]) -> None:
+    """Check that names are among the choices, as `unknown_name` says."""
+    for name in names:
+        if name not in choices:
+            raise unknown_name(thing, name, choices)

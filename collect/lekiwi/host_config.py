@@ -8,7 +8,7 @@ from msgspec import Meta
 from handrail.collect.client_config import CLIENTS, Port
 from handrail.collect.flags import check_file, names, one_of
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.typed import check_settings
 from handrail.datasets.advanced import Advanced
@@ -52,9 +52,7 @@ class HostConfig:
     def check(self) -> None:
         """Check the settings."""
         TASKS.check(self.task)
-        for camera in filter(None, (*self.camera_names, self.lost_camera)):
-            if camera not in _CAMERAS:
-                raise unknown_name("camera", camera, _CAMERAS)
+        check_known("camera", filter(None, (*self.camera_names, self.lost_camera)), _CAMERAS)
         check_settings(self, "--")
         if self.port_zmq_cmd == self.port_zmq_observations:
             raise HandrailError("--port_zmq_cmd and --port_zmq_observations: expected two ports, got one")

@@ -87,7 +87,7 @@ class Link:
         self._sent_at, self.late = math.inf, 0
         self.asked: Callable[[], EpisodeEvent | None] = lambda: None
         self._lock, self._closed = threading.Lock(), threading.Event()
-        self._episode, self._extras = 0, {}
+        self._episode, self._seed = 0, 0
         with _explained(f"--robot_client {name}: cannot be reached"):
             client.connect()
         self._heard = self._deadline = clock()
@@ -100,9 +100,7 @@ class Link:
 
     def begin(self, seed: int) -> None:
         """Begin an episode; our own simulation is told which, in every command, until it has heard."""
-        self._episode += 1
-        if self._simulated:
-            self._extras = {EPISODE: self._episode, SEED: seed}
+        self._episode, self._seed = self._episode + 1, seed
         self._catch_up()
         self._deadline = self._heard = self._clock()
 
@@ -157,9 +155,9 @@ class Link:
             _log.warning("robot %s: commands were late; it braked for %d periods", self._name, self.late)
 
     def _send(self, command: ArrayLike) -> None:
-        self._action = {**self.body.send(command), **self._extras}
+        self._action = self.body.send(command)
         if self._simulated:
-            self._action[SENT] = time.time()
+            self._action |= {EPISODE: self._episode, SEED: self._seed, SENT: time.time()}
         self._client.send_action(self._action)
         self._sent_at = self._clock()
 

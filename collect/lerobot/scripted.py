@@ -46,14 +46,13 @@ class EpisodeClock:
         if self._begun is None:
             self._begun = now
         if self._over is None and (now - self._begun >= self._episode if self._episode else done):
-            self._over = now
+            self._over = self._begun + self._episode if self._episode else now
         if self._over is None:
             return ""
-        start = self._begun + self._episode if self._episode else self._over
         if not self._changed:
-            self._changed = now >= start + self._reset / 2
+            self._changed = now >= self._over + self._reset / 2
             return NEXT if self._changed else HOLD
-        if now < start + self._reset + self._margin:
+        if now < self._over + self._reset + self._margin:
             return HOLD
         self._begun, self._over, self._changed = now, None, False
         return ""

@@ -97,11 +97,11 @@ class SimTeleoperator(Uncalibrated, Teleoperator):
         if self._operator is None:
             raise HandrailError(f"{self.name}: expected connect() before anything else")
         robot, self._steers = self.robot, True
-        if button := self._pressed(robot):
-            return robot.action.still(robot.grippers) | {button: 1.0}
-        asked = self._asked(robot)
+        asked = self._pressed(robot) or self._asked(robot)
         if isinstance(asked, EpisodeEvent):
-            return robot.action.still(robot.grippers) | {_BUTTONS.get(asked, HOLD): 1.0}
+            asked = _BUTTONS.get(asked, HOLD)
+        if isinstance(asked, str):
+            return robot.action.still(robot.grippers) | {asked: 1.0}
         if self.is_person:
             asked = self._as_gripped(asked, robot)
         return robot.action.action(asked, [tool.rotation for tool in robot.view.task.tools])

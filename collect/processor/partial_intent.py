@@ -8,7 +8,7 @@ import numpy as np
 
 from handrail.collect.processor.units import RobotUnits, number
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.errors import check_known
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
@@ -53,8 +53,7 @@ class PartialIntent:
         arm = zip(units.action_names, enumerate(units.scale, first), units.sends_position, strict=False)
         self._scaled |= {name: term for name, term, is_position in arm if not is_position}
         for name, (channel, scale) in inputs.items():
-            if channel not in channels.names:
-                raise unknown_name(f"channel of input {name}:", channel, channels.names)
+            check_known(f"channel of input {name}:", (channel,), channels.names)
             self._scaled[name] = (channels.names.index(channel), scale)
         own = enumerate(units.grippers)
         self._of_robot = {gripper.name: (hand, gripper) for hand, gripper in own if gripper}

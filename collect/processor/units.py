@@ -9,7 +9,7 @@ import numpy as np
 
 from handrail.collect.flags import check_names
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import RobotDescription
 from handrail.controllers.typed import Number, Text, decoded
@@ -213,8 +213,7 @@ def robot_units(said: str | Mapping[str, Any], description: RobotDescription) ->
     """
     if not isinstance(said, str):
         return RobotUnits(description, decoded(said, UnitsTable, "units"))
-    if said not in _KNOWN:
-        raise unknown_name("units", said, _KNOWN)
+    check_known("units", (said,), _KNOWN)
     return RobotUnits(description, _KNOWN[said](description))
 
 

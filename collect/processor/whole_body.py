@@ -107,9 +107,10 @@ class WholeBody:
             now: on any clock that advances [s].
         """
         reading = self._units.read(observation)
-        nonsense = "malformed_observation" if reading is None or self._leaps(reading, now) else ""
+        if reading and self._leaps(reading, now):
+            reading = None
         self._go_on(now)
-        if reading and not nonsense and observation is not self._said:
+        if reading and observation is not self._said:
             self._take(reading, now)
         self._said = observation
         if self._reading is None:
@@ -117,8 +118,8 @@ class WholeBody:
                 f"observation of {self._model.description.name}: expected finite numbers "
                 f"{', '.join(self._units.observation_names)}; got {shown(observation)}"
             )
-        stale = now - self._heard > self._timeout
-        self.trouble = nonsense or ("stale_observation" if stale else "")
+        stale = "stale_observation" if now - self._heard > self._timeout else ""
+        self.trouble = stale if reading else "malformed_observation"
         if math.isfinite(now):
             self._time = now
         v = np.where(self._held, 0.0, self.velocity)

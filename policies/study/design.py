@@ -55,7 +55,7 @@ rollouts = 50                   under each condition
 draws = 1                       the first so many
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Annotated, Literal
@@ -64,7 +64,7 @@ from msgspec import Meta
 
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.typed import AtLeastOne, Count
 
 MOST_DRAWS = 1000
@@ -180,15 +180,14 @@ class StudyDesign:
             raise HandrailError(f"study {self.name}: encoders: {words}, got {', '.join(self.encoders)}")
         if self.rounds:
             self._check_rounds(self.rounds)
-        once: dict[str, tuple[str, ...]] = {"modes": self.modes}
-        draws: dict[str, int] = {}
+        beside = self.beside or Beside()
         check_known(
             "mode of a pair", (mode for each in self.pairs for mode in (each.one, each.other)), self.modes
         )
         pairs = [(each.one, each.other, each.budget) for each in self.pairs]
         if len(set(pairs)) < len(pairs) or any(one == other for one, other, _ in pairs):
             raise HandrailError(f"study {self.name}: pairs: expected two modes each, once, got {pairs}")
-        counted = self.beside if self.beside and self.beside.same_number == self.draws else Beside()
+        counted = beside if beside.same_number == self.draws else Beside()
         numbered = counted.numbered or (self.modes if counted.same_number else ())
         by_number = (mode for *two, budget in pairs if budget == "number" for mode in two)
         check_known("mode of a pair by number, which same_number has in all draws", by_number, numbered)
@@ -196,11 +195,11 @@ class StudyDesign:
         if any(updates % self.curve[0] or updates >= most for updates in self.curve):
             words = f"expected multiples of the first below {most} updates"
             raise HandrailError(f"study {self.name}: curve {words}, got {self.curve}")
-        if beside := self.beside:
-            completed = [mode for mode in self.modes if mode in MODES and MODES[mode].controller == "mpc"]
-            check_known("mode of same_number", beside.numbered, self.modes)
-            check_known("mode of intents, which the MPC completes", beside.intents, completed)
-            draws |= {"beside.draws": beside.draws, "beside.same_number": beside.same_number}
+        completed = [mode for mode in self.modes if mode in MODES and MODES[mode].controller == "mpc"]
+        check_known("mode of same_number", beside.numbered, self.modes)
+        check_known("mode of intents, which the MPC completes", beside.intents, completed)
+        once = {"modes": self.modes}
+        draws = {"beside.draws": beside.draws, "beside.same_number": beside.same_number}
         if robust := self.robustness:
             once["robustness"] = (*robust.perturbations, *robust.protections)
             draws["robustness.draws"] = robust.draws
@@ -229,10 +228,3 @@ class StudyDesign:
             if not each.round_minutes or each.sizes:
                 found = f"got sizes {each.sizes}" if each.sizes else "found none"
                 raise HandrailError(f"{where}: expected round_minutes of task {task}, {found}")
-
-
-def check_known(what: str, names: Iterable[str], choices: Iterable[str]) -> None:
-    """Check that names are among the choices."""
-    for name in names:
-        if name not in choices:
-            raise unknown_name(what, name, choices)

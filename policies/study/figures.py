@@ -1,10 +1,11 @@
 """The figures of a study: contrasts, the policies by task, what disturbs, growth."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.figures import draw_values
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, rows, tidy
 from handrail.datasets.statistics.contrast import Contrast
@@ -13,6 +14,7 @@ from handrail.policies.study.results import Results, StudyCondition
 from handrail.policies.study.settings import after
 
 _WIDTH = 10.4  # [inch]
+_Stages = Mapping[tuple[str, str], float]  # by ending of a policy's label and treatment: how far grown
 CAPTIONS = {
     "contrasts": "What makes a difference: declared, over all tasks (dark), and in each task (grey).",
     "answer": "Success of the policies; lines: 95 %, ticks: draws. Round: joint velocities, unprotected;"
@@ -27,21 +29,26 @@ CAPTIONS = {
 
 def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     """Return matplotlib figures by name, see `CAPTIONS`; those for which there is something to show."""
-    tasks = [task for task in results.progress.design.tasks if results.of_task(task)]
+    design = results.progress.design
+    tasks = [task for task in design.tasks if results.of_task(task)]
     disturbed = [task for task in tasks if _disturbed(task, results)]
     made: dict[str, Any] = {}
     if any(each.interval and each.family == DECLARED for each in found):
         made["contrasts"] = _contrasts(found)
-    if rounds := results.progress.design.rounds:
+    if rounds := design.rounds:
         return made | ({"rounds": _rounds(tasks, list(rounds.ways), results)} if tasks else {})
     if tasks:
         made["answer"] = _answer(tasks, results)
     if disturbed:
         made["robustness"] = _robustness(disturbed, results)
-    if tasks and results.progress.design.curve:
-        made["updates"] = _grown(tasks, results, "updates [thousand]")
-    if sized := [task for task in tasks if results.progress.design.tasks[task].sizes]:
-        made["amounts"] = _grown(sized, results, "operator's time [min]")
+    if tasks and design.curve:
+        less = {("", after(each)): each / 1000 for each in design.curve}
+        grown = {name: less | {("", ""): design.tasks[name].steps / 1000} for name in tasks}
+        made["updates"] = _grown(grown, results, "updates [thousand]")
+    if sized := {name: task for name in tasks if (task := design.tasks[name]).sizes}:
+        less = {name: {(f" {size:g} min", ""): size for size in task.sizes} for name, task in sized.items()}
+        grown = {name: each | {("", ""): sized[name].minutes} for name, each in less.items()}
+        made["amounts"] = _grown(grown, results, "operator's time [min]")
     return made
 
 
@@ -100,56 +107,60 @@ def _answer(tasks: Sequence[str], results: Results) -> Any:
     return figure
 
 
+def _draw(axes: Any, places: FloatArray, found: Sequence[StudyCondition], **style: Any) -> None:
+    """Draw the success of conditions at some places, each with its 95 %."""
+    values = np.array([each.value.estimate for each in found])
+    errors = np.abs(np.array([each.value.interval for each in found]).T - values)
+    axes.errorbar(places, 100 * values, yerr=100 * errors, **style)
+
+
+def _finish(figure: Any) -> None:
+    """Say what the height of all panels is; name beside them, once, what is drawn."""
+    figure.axes[0].set(ylabel="policy success [%], 95 %", ylim=(-3, 103))
+    pairs = [zip(*axes.get_legend_handles_labels(), strict=True) for axes in figure.axes]
+    known = {label: handle for each in pairs for handle, label in each}
+    place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    figure.axes[-1].legend(known.values(), known.keys(), fontsize=8, frameon=False, **place)
+
+
 def _rounds(tasks: Sequence[str], ways: Sequence[str], results: Results) -> Any:
     """One panel a task: success after every round, a line each way, all from the same policy on."""
     figure, panels = _panels(tasks, 3.2, sharey=True)
     for axes, task in panels:
-        found = results.of_task(task)
+        sizes, found = results.progress.design.tasks[task], results.of_task(task)
         for place, way in enumerate(ways):
             shown = [each for each in found if (cell := each.learners[0].cell).mode == way or not cell.before]
             rounds = np.array([len(each.learners[0].cell.rounds) - 1 for each in shown])
-            sizes = results.progress.design.tasks[task]
             minutes = sizes.minutes + rounds * sizes.round_minutes
-            values = np.array([each.value.estimate for each in shown])
-            errors = np.abs(np.array([each.value.interval for each in shown]).T - values) * 100
-            style = {"color": COLOURS[place], "marker": "o", "label": way, "lw": 1.4}
             shift = 0.02 * (place - 1) * sizes.round_minutes
-            axes.errorbar(minutes + shift, 100 * values, yerr=errors, elinewidth=1.0, ms=4, **style)
-        axes.set(xlabel="operator's time [min]", ylim=(-3, 103))
+            style = {"color": COLOURS[place], "marker": "o", "lw": 1.4, "elinewidth": 1.0, "ms": 4}
+            _draw(axes, minutes + shift, shown, label=way, **style)
+        axes.set_xlabel("operator's time [min]")
         tidy(axes, "y")
-    figure.axes[0].set_ylabel("policy success [%], 95 %")
-    figure.axes[-1].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    _finish(figure)
     return figure
 
 
-def _grown(tasks: Sequence[str], results: Results, over: str) -> Any:
+def _grown(stages: Mapping[str, _Stages], results: Results, over: str) -> Any:
     """One panel a task: success of the policies of joint velocities over their updates, or their data."""
-    design = results.progress.design
-    figure, panels = _panels(tasks, 3.2, sharey=True)
+    modes = results.progress.design.modes
+    figure, panels = _panels(list(stages), 3.2, sharey=True)
     for axes, task in panels:
-        sizes = design.tasks[task]
-        places, every = {("", after(each)): each / 1000 for each in design.curve}, sizes.steps / 1000
-        if "updates" not in over:
-            places, every = {(f" {size:g} min", ""): size for size in sizes.sizes}, sizes.minutes
-        for place, mode in enumerate(design.modes):
+        for place, mode in enumerate(modes):
             shown = {
                 at: found
-                for (more, treatment), at in [*places.items(), (("", ""), every)]
-                if (found := results.find(task, f"{mode}{more}", treatment))
+                for (ending, treatment), at in stages[task].items()
+                if (found := results.find(task, mode + ending, treatment))
             }
-            values = np.array(
-                [[found.value.estimate, *(found.value.interval or ())] for found in shown.values()]
-            )
             if not shown:
                 continue
-            style = _style(next(iter(shown.values())), results) | {"label": mode, "elinewidth": 1.2, "ms": 5}
-            errors = np.abs(values[:, 1:] - values[:, :1]).T * 100
-            shift = 0.006 * (place - 0.5 * (len(design.modes) - 1)) * every  # intervals lie side by side
-            axes.errorbar(np.array([*shown]) + shift, 100 * values[:, 0], yerr=errors, **style)
-        axes.set(xlabel=over, ylim=(-3, 103))
+            found = list(shown.values())
+            shift = 0.006 * (place - 0.5 * (len(modes) - 1)) * stages[task]["", ""]  # side by side
+            style = _style(found[0], results) | {"label": mode, "elinewidth": 1.2, "ms": 5}
+            _draw(axes, np.array([*shown]) + shift, found, **style)
+        axes.set_xlabel(over)
         tidy(axes)
-    figure.axes[0].set_ylabel("policy success [%], 95 %")
-    figure.axes[-1].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    _finish(figure)
     return figure
 
 
@@ -164,17 +175,9 @@ def _robustness(tasks: Sequence[str], results: Results) -> Any:
             mine = [each for name in names if (each := results.find(task, label, name))]
             shown = [each for one in mine if (each := one.beside(mine[-1]))]
             shift = 0.5 * ((place + 0.5) / len(labels) - 0.5)
-            xs = [names.index(each.treatment) + shift for each in shown]
-            values = np.array([each.value.estimate for each in shown])
-            errors = np.abs(np.array([each.value.interval for each in shown]).T - values) * 100
-            style = _style(shown[0], results) | {"ls": "", "elinewidth": 1.2, "ms": 5}
-            axes.errorbar(xs, 100 * values, yerr=errors, **style)
-        axes.set(xticks=range(len(names)), ylim=(-3, 103))
-        axes.set_xticklabels(["without", *names[1:]], rotation=20)
+            xs = np.array([names.index(each.treatment) for each in shown]) + shift
+            _draw(axes, xs, shown, **_style(shown[0], results) | {"ls": "", "elinewidth": 1.2, "ms": 5})
+        axes.set_xticks(range(len(names)), ["without", *names[1:]], rotation=20)
         tidy(axes, "y")
-    figure.axes[0].set_ylabel("policy success [%], 95 %")
-    pairs = [zip(*axes.get_legend_handles_labels(), strict=True) for axes in figure.axes]
-    known = {label: handle for each in pairs for handle, label in each}
-    place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-    figure.axes[-1].legend(known.values(), known.keys(), fontsize=8, frameon=False, **place)
+    _finish(figure)
     return figure

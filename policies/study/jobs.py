@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from handrail.policies.study.design import MIXED, Rounds, StudyDesign
+from handrail.policies.study.design import MIXED, Beside, Rounds, StudyDesign
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,8 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
         for cell in _cells(design, rounds, draw):
             yield from (StudyJob(cell), StudyJob(cell, StudyPolicy(cell, "intent")))
         return
-    robust, beside = design.robustness is not None and draw < design.robustness.draws, design.beside
+    robust = design.robustness is not None and draw < design.robustness.draws
+    beside = design.beside or Beside()
     cells = [[StudyCell(task, mode, draw) for mode in design.modes] for task in design.tasks]
     for each in cells:
         yield from map(StudyJob, each)
@@ -112,9 +113,9 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
     for cell in (cell for each in cells for cell in each):
         for minutes in design.tasks[cell.task].sizes:
             yield StudyJob(cell, StudyPolicy(cell, minutes=minutes))
-        if beside and draw < beside.draws and cell.mode in beside.intents:
+        if draw < beside.draws and cell.mode in beside.intents:
             yield StudyJob(cell, StudyPolicy(cell, "intent"), robust)
-        if beside and draw < beside.same_number and cell.mode in (beside.numbered or design.modes):
+        if draw < beside.same_number and cell.mode in (beside.numbered or design.modes):
             yield StudyJob(cell, StudyPolicy(cell, budget="number"))
 
 

@@ -10,20 +10,20 @@ from handrail.policies.study.design import StudyDesign
 _WORST = 0.25  # variance of a rollout's success: of one that succeeds in half of all cases
 
 
-def standard_error(design: StudyDesign, each: Declared, tasks: int = 0) -> float:
+def standard_error(design: StudyDesign, each: Declared, alone: bool = False) -> float:
     """Return √(Σ w² (σ² + ¼ / R) / (T n)) of a contrast: n draws, T tasks, R rollouts a policy.
 
     Args:
         design: of the study.
         each: the contrast, with its w and σ.
-        tasks: T; 0 for all of the study.
+        alone: whether it is of one task instead of all.
     """
     total = sum(weight**2 for weight in each.parts.values())
     variance = (each.sd**2 + _WORST / design.rollouts) * total
-    return float(np.sqrt(variance / (design.draws * (tasks or len(design.tasks)))))
+    return float(np.sqrt(variance / (design.draws * (1 if alone else len(design.tasks)))))
 
 
-def detectable(design: StudyDesign, each: Declared, tasks: int = 0, tests: int = 0) -> float:
+def detectable(design: StudyDesign, each: Declared, alone: bool = False) -> float:
     """Return the difference that a contrast detects in 80 % of such studies.
 
     (t_{1 − α/2m} + t_{0.8}) s: m tests, s the `standard_error`.
@@ -31,10 +31,10 @@ def detectable(design: StudyDesign, each: Declared, tasks: int = 0, tests: int =
     Args:
         design: of the study; it has two draws or more.
         each: the contrast.
-        tasks: of which it is; 0 for all of the study.
-        tests: m; 0 for as many as are declared.
+        alone: whether it is of one task and the only test, instead of all tasks and all that is declared.
     """
-    return reach(tests or len(declared(design)), design.draws - 1) * standard_error(design, each, tasks)
+    tests = 1 if alone else len(declared(design))
+    return reach(tests, design.draws - 1) * standard_error(design, each, alone)
 
 
 def plan(design: StudyDesign) -> str:
@@ -46,8 +46,8 @@ def plan(design: StudyDesign) -> str:
     if design.draws < 2:
         return f"{told} One draw tests nothing."
     whole, single = (
-        ", ".join(f"{each.label} {100 * detectable(design, each, *scope):.0f}" for each in asked)
-        for scope in ((), (1, 1))
+        ", ".join(f"{each.label} {100 * detectable(design, each, alone):.0f}" for each in asked)
+        for alone in (False, True)
     )
     spread = " or ".join(f"{100 * sd:g}" for sd in sorted({each.sd for each in asked}))
     told = (

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
-from handrail.controllers.errors import FAILED
+from handrail.controllers.errors import FAILED, check_known
 from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
@@ -13,7 +13,7 @@ from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.config import TrainConfig, check_trainable
 from handrail.policies.imitation.training.presets import policy_config
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import StudyDesign, check_known
+from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import StudyJob, StudyLayout
 from handrail.policies.study.power import plan
 from handrail.policies.study.progress import StudyProgress, note_design

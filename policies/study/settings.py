@@ -8,13 +8,14 @@ from typing import Any
 
 from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known, unknown_name
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import decoded
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.training.presets import as_json, resolved
-from handrail.policies.study.design import MOST_DRAWS, StudyDesign, Way, check_known
+from handrail.policies.imitation.interface.checkpoint import as_json
+from handrail.policies.imitation.training.presets import resolved
+from handrail.policies.study.design import MOST_DRAWS, StudyDesign, Way
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 PRESETS = Path(__file__).parent / "presets"

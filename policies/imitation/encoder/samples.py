@@ -25,7 +25,7 @@ from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.observation import AgentObservation
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.errors import check_known
 from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.interface.encoder import Reads
@@ -89,9 +89,7 @@ class Drawn:
         turns = {item.name: item.turns for item in env.start.scene.objects if item.turns > 1}
         movable = tuple(item.name for item in env.start.scene.objects if item.movable)
         known = {each.name: each for each in env.model.description.cameras}
-        for name in (names := self.config.session.camera_names):
-            if name not in known:
-                raise unknown_name("camera of the robot", name, list(known))
+        check_known("camera of the robot", names := self.config.session.camera_names, known)
         cameras = {name: CameraMount.of(known[name], env.model, env.image_size) for name in names}
         return Reads(env.model.description.name, self.config.task, cameras, interface, turns, movable)
 

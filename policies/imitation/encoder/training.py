@@ -158,24 +158,26 @@ class _Training:
 
     def save(self) -> None:
         """Keep where the training stands."""
-        parts = self._encoder.network, self._averaged, self._optimizer
         content = {"settings": self._settings, "at": (self._update, self._chunk)}
         temporary = self._draft.with_suffix(".partial")
-        torch.save(content | {"parts": [part.state_dict() for part in parts]}, temporary)
+        torch.save(content | {"parts": [part.state_dict() for part in self._parts]}, temporary)
         temporary.replace(self._draft)
 
     def _load(self) -> None:
         try:
             content = torch.load(self._draft, self._config.device, weights_only=True)
-            same_settings = content["settings"] == self._settings
-            parts = self._encoder.network, self._averaged, self._optimizer
-            for part, state in zip(parts, content["parts"] if same_settings else (), strict=same_settings):
+            if content["settings"] != self._settings:
+                raise HandrailError("was begun with other settings")
+            for part, state in zip(self._parts, content["parts"], strict=True):
                 part.load_state_dict(state)
             self._update, self._chunk = content["at"]
         except Exception as error:  # of PyTorch: whatever the file holds, it is refused
             raise HandrailError(f"{str(self._draft)!r}: {message_of(error)}; say --overwrite") from error
-        if not same_settings:
-            raise HandrailError(f"{str(self._draft)!r}: was begun with other settings; say --overwrite")
+
+    @property
+    def _parts(self) -> tuple[Any, ...]:
+        """All that learns, or that remembers what was learnt."""
+        return self._encoder.network, self._averaged, self._optimizer
 
     @property
     def _settings(self) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from handrail.controllers.robot.description import load_description
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.typed import Count, check
 from handrail.datasets.reading.reader import read_episodes, read_info
+from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.strict_json import load_json, read_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import (
@@ -39,7 +40,6 @@ from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT,
 from handrail.policies.imitation.interface.trust import check_policy_folder
 
 _TRAINED = "train_config.json"  # of LeRobot's: how a policy was trained, not how it drives
-_IMAGES = "observation.images."
 _SAID = ("environment", "robot", "mode", "fps", "actions")
 
 
@@ -142,7 +142,7 @@ def _features(settings: Mapping[str, Any], where: str) -> tuple[dict[str, int], 
     for which in ("input_features", "output_features"):
         features = check(settings.get(which) or {}, dict[str, _Shaped], f"{where}: {which}")
         for name, shape in ((name, feature["shape"]) for name, feature in features.items()):
-            camera = name.removeprefix(_IMAGES)
+            camera = name.removeprefix(PICTURE)
             if len(shape) != (1 if camera == name else 3):
                 expected = "one dimension" if camera == name else "channels, height and width"
                 raise HandrailError(f"{where}: {name}: expected {expected}, got {shape}")

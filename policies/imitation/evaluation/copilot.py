@@ -23,7 +23,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.registry import resolved
 from handrail.policies.imitation.evaluation.conditions import Checkpoint, read_checkpoint
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.evaluation.policy_operator import PolicyOperator, RecordedColumns
+from handrail.policies.imitation.evaluation.policy_operator import PolicyOperator
 from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.trained import load_policy
 
@@ -46,7 +46,9 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
         task=config.task, robot=config.robot, mode="" if config.mask else config.mode, fps=round(env.fps)
     )
     checkpoints = [read_checkpoint(Path(folder).expanduser(), asked) for folder in config.policy]
-    members = [_planner(_fitting(checkpoint, config, env), env) for checkpoint in checkpoints]
+    for checkpoint in checkpoints:
+        _check_fits(checkpoint, config, env)
+    members = [_Driver(load_policy(each.folder), each, env, env.period) for each in checkpoints]
     planner: Planner = members[0]
     if len(members) > 1:
         planner = Ensemble(
@@ -64,8 +66,8 @@ def _is_completed(mode: TeleopMode) -> bool:
     return CONTROLLERS.find(mode.controller).objectives
 
 
-def _fitting(checkpoint: Checkpoint, config: RecordConfig, env: HandrailEnv) -> Checkpoint:
-    """Return a policy if it can drive in a recording."""
+def _check_fits(checkpoint: Checkpoint, config: RecordConfig, env: HandrailEnv) -> None:
+    """Check that a policy can drive in a recording."""
     meta, where = checkpoint.meta, f"--policy {checkpoint.folder}"
     for name, own, here in (
         ("--task", meta.environment, config.task),
@@ -80,7 +82,6 @@ def _fitting(checkpoint: Checkpoint, config: RecordConfig, env: HandrailEnv) -> 
             cameras, (height, width) = ",".join(checkpoint.pictures), size
             flags = f"--cameras {cameras} --image_size {width}x{height}"
             raise HandrailError(f"{where}: reads pictures: expected {flags} or more cameras")
-    return checkpoint
 
 
 class _Driver(PolicyOperator):
@@ -95,15 +96,3 @@ class _Driver(PolicyOperator):
         """Return the intent now."""
         with threads(1):
             return super().act(view)
-
-
-def _planner(checkpoint: Checkpoint, env: HandrailEnv) -> PolicyOperator:
-    meta = checkpoint.meta
-    return _Driver(
-        load_policy(checkpoint.folder),
-        meta.interface or RecordedColumns(checkpoint),
-        Channels.of(env.model.description),
-        meta.mode,
-        env.task.description,
-        env.period,
-    )

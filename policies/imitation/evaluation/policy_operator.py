@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from handrail.collect.operators.operator import View
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.policies.imitation.evaluation.conditions import Checkpoint, mode_action
-from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.trained import TrainedPolicy
 
@@ -42,10 +42,8 @@ class PolicyOperator:
 
     Args:
         policy: whoever was trained.
-        interface: what it reads and writes.
-        channels: of the robot.
-        mode: name of the teleop mode that the intents carry.
-        task: one sentence: what to do.
+        checkpoint: of it; its mode is that of the intents.
+        env: where it steers.
         period: from one of its actions to the next [s]; 0 where it is asked at each of them.
 
     Attributes:
@@ -56,24 +54,19 @@ class PolicyOperator:
     doubt = 0.0
 
     def __init__(
-        self,
-        policy: TrainedPolicy,
-        interface: PolicyInterface | RecordedColumns,
-        channels: Channels,
-        mode: str,
-        task: str = "",
-        period: float = 0.0,
+        self, policy: TrainedPolicy, checkpoint: Checkpoint, env: HandrailEnv, period: float = 0.0
     ) -> None:
-        self._policy, self._interface, self._mode, self._task = policy, interface, mode, task
-        self._unusable = Intent(np.full(channels.size, np.nan), np.ones(channels.size, bool))
-        self._memory = SceneMemory(policy.encoder.reads) if policy.encoder else None
+        meta, size = checkpoint.meta, Channels.of(env.model.description).size
+        self._policy, self._mode, self._task = policy, meta.mode, env.task.description
+        self._interface = meta.interface or RecordedColumns(checkpoint)
+        self._unusable = Intent(np.full(size, np.nan), np.ones(size, bool))
         self._period = period
         self.malformed = 0
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
-        if self._memory:
-            self._memory.forget()
+        if self._policy.encoder:
+            self._memory = SceneMemory(self._policy.encoder.reads)
         self.malformed = 0
         self.replan()
 
@@ -86,9 +79,8 @@ class PolicyOperator:
         """Return the intent now."""
         seen = view.observation
         state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
-        if self._memory and self._policy.encoder:
-            seen_now = {name: each[None] for name, each in pictures.items()}
-            said = self._policy.encoder.look(seen_now, state[None])
+        if encoder := self._policy.encoder:
+            said = encoder.look({name: each[None] for name, each in pictures.items()}, state[None])
             around = self._memory.take(said, 0)
         if self._period and view.state.time > self._asked + 1.5 * self._period:
             self._policy.skip(round((view.state.time - self._asked) / self._period) - 1)

@@ -22,11 +22,10 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.unprotected import unprotected_controller
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import PolicyCondition, own_protection
-from handrail.policies.imitation.evaluation.policy_operator import PolicyOperator, RecordedColumns
+from handrail.policies.imitation.evaluation.policy_operator import PolicyOperator
 from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.trained import TrainedPolicy, repeatable
 
@@ -107,10 +106,8 @@ def run_rollout(
     env = _env(config, meta.fps, perturbation, render)
     controller = _controller(condition.protection, meta.intent_mode, meta.environment, env)
     policy = _policy(checkpoint.folder, checkpoint.digest, load)
-    channels = Channels.of(env.model.description)
-    interface = meta.interface or RecordedColumns(checkpoint)
     with threads(1), repeatable(seed):
-        operator = PolicyOperator(policy, interface, channels, meta.mode, env.task.description)
+        operator = PolicyOperator(policy, checkpoint, env)
         shown: Operator = operator
         if perturbation.blank or perturbation.swap:
             other = replace(perturbation, swap=0)

@@ -134,6 +134,11 @@ def write_meta(folder: Path, meta: PolicyMeta) -> None:
     write_whole(folder / NAME, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
 
+def as_json(settings: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass as they come back from a file."""
+    return json.loads(json.dumps(asdict(settings)))
+
+
 def last_checkpoint(training: Path) -> Path | None:
     """Return the whole checkpoint with the most updates in a training's folder; None if there is none."""
     found = [path for path in (training / "checkpoints").glob("*") if path.name.isdecimal()]

@@ -1,8 +1,7 @@
 """An encoder as a step of LeRobot's processors, inside a checkpoint: who loads it needs no more."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -10,13 +9,14 @@ import torch
 from lerobot.configs import PipelineFeatureType, PolicyFeature
 from lerobot.lerobot_types import EnvTransition, TransitionKey
 from lerobot.processor import ProcessorStep, ProcessorStepRegistry
-from lerobot.utils.constants import OBS_IMAGES
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import decoded
+from handrail.datasets.recording.frames import PICTURE
+from handrail.policies.imitation.interface.checkpoint import as_json
 from handrail.policies.imitation.interface.encoder import Encoder, Reads
-from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.trust import ENCODE
 
@@ -51,15 +51,13 @@ class PolicyEncoderStep(OwnStep):
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
         """Return the observation with what the pictures say."""
-        shown, reads = dict(transition.get(TransitionKey.OBSERVATION) or {}), self.encoder.reads
-        sizes = len(reads.interface.state_names), len(reads.interface.environment_names)
-        if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
-            shown[STATE] = shown[STATE][..., : sizes[0]]
-        states, device = numbers_of(shown, STATE, sizes[0], ENCODE), shown[STATE].device
+        reads, names = self.encoder.reads, self.encoder.reads.interface
+        shown = apart(transition, names)
+        states, device = numbers_of(shown, STATE, len(names.state_names), ENCODE), shown[STATE].device
         pictures = {
             name: shown[key].detach().cpu().reshape(-1, *shown[key].shape[-3:])
             for name in reads.cameras
-            if isinstance(shown.get(key := f"{OBS_IMAGES}.{name}"), torch.Tensor)
+            if isinstance(shown.get(key := PICTURE + name), torch.Tensor)
         }
         said = self.encoder.look(pictures, states)
         self._memories += [SceneMemory(reads) for _ in states[len(self._memories) :]]
@@ -67,16 +65,16 @@ class PolicyEncoderStep(OwnStep):
         moments = zip(self._memories, range(len(states)), strict=False)
         rows = np.stack([memory.take(said, moment) for memory, moment in moments])
         around = torch.as_tensor(rows, device=device)
-        shown[ENVIRONMENT] = around.reshape(*shown[STATE].shape[:-1], sizes[1])
+        shown[ENVIRONMENT] = around.reshape(*shown[STATE].shape[:-1], rows.shape[1])
         return changed(transition, TransitionKey.OBSERVATION, shown)
 
     def _forget(self, times: object) -> None:
         """Forget where an episode begins: where the time is not later."""
         if isinstance(times, torch.Tensor):
             before, self._times = self._times, times.detach().cpu().numpy().ravel()
-            for memory, now, then in zip(self._memories, self._times, before, strict=False):
+            for row, now, then in zip(range(len(self._memories)), self._times, before, strict=False):
                 if now <= then:
-                    memory.forget()
+                    self._memories[row] = SceneMemory(self.encoder.reads)
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return the encoder's weights."""
@@ -92,6 +90,18 @@ class PolicyEncoderStep(OwnStep):
         self._times = np.zeros(0)
 
 
+def apart(transition: EnvTransition, interface: PolicyInterface) -> dict[str, Any]:
+    """Return an observation with robot and scene apart.
+
+    A robot of LeRobot's, such as `handrail_sim`, shows them as one vector, `observation.state`.
+    """
+    shown = dict(transition.get(TransitionKey.OBSERVATION) or {})
+    sizes = [len(interface.state_names), len(interface.environment_names)]
+    if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
+        shown[STATE], shown[ENVIRONMENT] = torch.split(shown[STATE], sizes, dim=-1)
+    return shown
+
+
 def changed(transition: EnvTransition, key: TransitionKey, value: Any) -> EnvTransition:
     """Return a transition with another observation or action."""
     copied: Any = transition.copy()
@@ -101,7 +111,7 @@ def changed(transition: EnvTransition, key: TransitionKey, value: Any) -> EnvTra
 
 def encoder_step(encoder: Encoder) -> PolicyEncoderStep:
     """Return the step of an encoder."""
-    step = PolicyEncoderStep(json.loads(json.dumps(asdict(encoder.reads))))
+    step = PolicyEncoderStep(as_json(encoder.reads))
     step.encoder = encoder
     return step
 

@@ -33,11 +33,6 @@ class SceneMemory:
 
     def __init__(self, reads: Reads) -> None:
         self._reads = reads
-        self.forget()
-
-    def forget(self) -> None:
-        """Forget all: an episode begins."""
-        reads = self._reads
         self._known = {
             name: _Known(reads.turns.get(name, 1), name in reads.movable) for name, _, _ in reads.objects
         }

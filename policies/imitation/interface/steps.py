@@ -7,7 +7,6 @@ pictures
 ```
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -31,10 +30,11 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.typed import Name, decoded
-from handrail.policies.imitation.interface.checkpoint import MIXED, Fps
+from handrail.policies.imitation.interface.checkpoint import MIXED, Fps, as_json
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import (
     OwnStep,
+    apart,
     changed,
     encoder_step,
     numbers_of,
@@ -124,10 +124,7 @@ class PolicyStep(OwnStep):
 
 @ProcessorStepRegistry.register(VIEW)
 class PolicyViewStep(PolicyStep):
-    """Shows a policy what is recorded as it learnt to see it: relative poses, no velocities of its own.
-
-    A robot of LeRobot's, such as `handrail_sim`, shows robot and scene as one vector, `observation.state`.
-    """
+    """Shows a policy what is recorded as it learnt to see it: relative poses, no velocities of its own."""
 
     raw: Mapping[str, Any]
     """The observation that was seen last, before it was changed."""
@@ -142,18 +139,15 @@ class PolicyViewStep(PolicyStep):
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
         """Return what the policy reads."""
-        raw = dict(transition.get(TransitionKey.OBSERVATION) or {})
-        shown, sizes = dict(raw), (len(self.seen.state_names), len(self.seen.environment_names))
-        if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
-            shown[STATE], shown[ENVIRONMENT] = torch.split(shown[STATE], [*sizes], dim=-1)
-        state = numbers_of(shown, STATE, sizes[0], VIEW)
-        around = numbers_of(shown, ENVIRONMENT, sizes[1], VIEW) if sizes[1] else np.zeros((len(state), 0))
+        shown, size = apart(transition, self.seen), len(self.seen.environment_names)
+        state = numbers_of(shown, STATE, len(self.seen.state_names), VIEW)
+        around = numbers_of(shown, ENVIRONMENT, size, VIEW) if size else np.zeros((len(state), 0))
         device = shown[STATE].device
         for key, values in zip((STATE, ENVIRONMENT), self.seen.observe(state, around), strict=True):
             shown.pop(key, None)
             if values.shape[1]:
                 shown[key] = torch.as_tensor(values, device=device)
-        self.raw, self.state = raw, state
+        self.raw, self.state = dict(transition.get(TransitionKey.OBSERVATION) or {}), state
         return changed(transition, TransitionKey.OBSERVATION, shown)
 
     def reset(self) -> None:
@@ -241,7 +235,7 @@ def with_steps(
     before: Any,
     after: Any,
     interface: PolicyInterface | None,
-    by: Completion | None = None,
+    by: Completion,
     encoder: Encoder | None = None,
 ) -> tuple[Any, Any]:
     """Return a policy's processors with the steps of its interface, so that anybody can run the policy.
@@ -255,14 +249,14 @@ def with_steps(
     """
     if interface is None:
         return before, after
-    described = json.loads(json.dumps(asdict(interface)))
+    described = as_json(interface)
     view, steps = PolicyViewStep(described), list(before.steps)
     normalisers = [i for i, step in enumerate(steps) if isinstance(step, NormalizerProcessorStep)]
     first = normalisers[0] if normalisers else len(steps)
     steps[first:first] = [*([encoder_step(encoder)] if encoder else []), view]
     act = PolicyActionStep(described)
-    known = by and by.robot in ROBOTS and by.task in TASKS and by.mode in MODES and by.hand != MIXED
-    if interface.is_partial and by and known:
+    known = by.robot in ROBOTS and by.task in TASKS and by.mode in MODES and by.hand != MIXED
+    if interface.is_partial and known:
         act = PolicyCompletionStep(described, {name: each for name, each in asdict(by).items() if each})
     return replace(before, steps=steps), replace(after, steps=[*after.steps, act])
 

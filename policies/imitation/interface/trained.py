@@ -17,6 +17,7 @@ from safetensors.torch import load_model
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.recording.frames import PICTURE
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import encoder_of
@@ -66,7 +67,7 @@ class TrainedPolicy:
         }
         for camera, picture in (images or {}).items():
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
-            batch[f"observation.images.{camera}"] = pixels[None].float() / 255.0
+            batch[PICTURE + camera] = pixels[None].float() / 255.0
         batch["task"] = [task]
         try:
             with torch.inference_mode():
@@ -95,17 +96,17 @@ class TrainedPolicy:
         return getattr(self.policy, "_action_queue", queues.get(ACTION, deque()))
 
 
-def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
+def load_policy(folder: str | Path) -> TrainedPolicy:
     """Load a policy from a `pretrained_model` folder, a checkpoint, or a training's folder (the last one).
 
-    Whoever made it, loading it runs no code of theirs (`trust.py`).
+    It computes on the CPU. Whoever made it, loading it runs no code of theirs (`trust.py`).
     """
     place = model_folder(Path(folder).expanduser())
     meta = read_meta(place) if (place / NAME).is_file() else None
     settings = check_policy_folder(place)
-    kind, override = settings.pop("type"), {"device_processor": {"device": device}}
+    kind, override = settings.pop("type"), {"device_processor": {"device": "cpu"}}
     try:
-        config = draccus.decode(registered_policies()[kind], settings | {"device": device})
+        config = draccus.decode(registered_policies()[kind], settings | {"device": "cpu"})
         policy = get_policy_class(kind).from_pretrained(place, config=config, strict=True)
         around = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused

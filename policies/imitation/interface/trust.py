@@ -92,9 +92,7 @@ def _steps(path: Path, policy: type) -> list[dict[str, Any]]:
     steps = content.get("steps") if isinstance(content, dict) else None
     if not isinstance(steps, list):
         raise HandrailError(f"{str(path)!r}: expected a processor with steps, got {shown(content)}")
-    with contextlib.suppress(
-        ImportError
-    ):  # of a policy's own steps; what is missing is said when it is loaded
+    with contextlib.suppress(ImportError):  # what a policy's own steps lack is said when it is loaded
         importlib.import_module(policy.__module__.replace("configuration_", "processor_"))
     known = ProcessorStepRegistry.list()
     for number, step in enumerate(steps):

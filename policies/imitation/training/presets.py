@@ -1,18 +1,17 @@
 """Sizes of policies that suit a CPU or a GPU, and LeRobot's configuration of a policy; both as they began."""
 
-import json
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from safetensors import SafetensorError
 
-from handrail.controllers.errors import HandrailError, message_of, unknown_name
+from handrail.controllers.errors import HandrailError, check_known, message_of
 from handrail.datasets.storage.strict_json import parse_json
 from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
-from handrail.policies.imitation.interface.checkpoint import PolicyMeta, TrainingSizes
+from handrail.policies.imitation.interface.checkpoint import PolicyMeta, TrainingSizes, as_json
 from handrail.policies.imitation.interface.trust import registered_policies
 
 if TYPE_CHECKING:
@@ -72,14 +71,11 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     from handrail.policies.imitation.interface.compute import device_of
 
     choices, sizes = registered_policies(), resolved(config)
-    if config.policy not in choices:
-        raise unknown_name("policy", config.policy, choices)
+    check_known("policy", (config.policy,), choices)
     known = {entry.name for entry in fields(choices[config.policy])}
     if config.lr and "optimizer_lr" not in known:
         raise HandrailError(f"--lr: the policy {config.policy} has none; give its own with --policy_options")
-    for key in sizes.options:
-        if key not in known:
-            raise unknown_name(f"setting of the policy {config.policy}", key, known)
+    check_known(f"setting of the policy {config.policy}", sizes.options, known)
     device = device_of(config.device or ("cuda" if config.preset == "gpu" else "cpu"))
     wanted = {"pretrained_backbone_weights": None, "push_to_hub": False, "device": device}
     wanted |= {"optimizer_lr": sizes.lr, "optimizer_lr_backbone": sizes.lr} if sizes.lr else {}
@@ -128,11 +124,6 @@ def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
         if now.get(name) != then.get(name):
             words = f"expected {then.get(name)} as the training began"
             raise HandrailError(f"--resume with {name} {now.get(name)}: {words}")
-
-
-def as_json(settings: Any) -> Mapping[str, Any]:
-    """Return the fields of a dataclass as they come back from a file."""
-    return json.loads(json.dumps(asdict(settings)))
 
 
 def _value(text: str) -> Any:

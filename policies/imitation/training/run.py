@@ -54,8 +54,8 @@ class TrainingRun:
         settings: LeRobot's.
         learnt: what is learnt from.
         checkpoint: to go on from; None to begin.
+        weights: folder of the policy whose weights and normalisation it begins with; None for its own.
         encoder: that reads pictures for the policy when it drives.
-        earlier: the policy whose weights and normalisation one that begins has; None for weights of its own.
     """
 
     def __init__(
@@ -63,8 +63,8 @@ class TrainingRun:
         settings: TrainPipelineConfig,
         learnt: MemoryDataset,
         checkpoint: Path | None,
-        encoder: Encoder | None = None,
-        earlier: Path | None = None,
+        weights: Path | None,
+        encoder: Encoder | None,
     ) -> None:
         described = settings.policy
         assert described is not None
@@ -73,18 +73,17 @@ class TrainingRun:
         self._folder, self._sums = settings.output_dir, read_sums(checkpoint)
         self._accelerator = _accelerator(described)
         set_seed(settings.seed, self._accelerator)  # pyright: ignore[reportArgumentType]
-        place = earlier if checkpoint is None else checkpoint / MODEL
-        if place is not None:
-            described.pretrained_path = place
+        if weights is not None:
+            described.pretrained_path = weights
         stats: Any = learnt.meta.stats
         policy: Any = make_policy(described, learnt.meta)  # pyright: ignore[reportArgumentType]
-        if place is None:
+        if weights is None:
             around = make_pre_post_processors(described, dataset_stats=stats)
         else:
             device = {"device_processor": {"device": self._accelerator.device.type}}
-            around = make_pre_post_processors(described, str(place), preprocessor_overrides=device)
-            load_weights(policy, place)  # LeRobot leaves out what does not fit
-            check_numbers(policy, around, place)
+            around = make_pre_post_processors(described, str(weights), preprocessor_overrides=device)
+            load_weights(policy, weights)  # LeRobot leaves out what does not fit
+            check_numbers(policy, around, weights)
         optimizer, schedule = make_optimizer_and_scheduler(settings, policy)
         if isinstance(optimizer, torch.optim.Adam):
             for group in optimizer.param_groups:  # all weights in one call

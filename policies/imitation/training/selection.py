@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta
 
@@ -88,6 +88,6 @@ def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:
     if config.success_only and any(row.get("success") is None for row in rows):
         raise HandrailError("--success_only: expected episodes that say whether they succeeded; these do not")
     modes = {str(row.get("mode")) for row in rows}
-    if config.mode and config.mode not in modes:
-        raise unknown_name("mode in the dataset", config.mode, modes)
+    if config.mode:
+        check_known("mode in the dataset", (config.mode,), modes)
     return [row for row in rows if not config.mode or row["mode"] == config.mode]

@@ -54,10 +54,12 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     lock = beside(Path(os.path.realpath(config.folder)), "lock"), "trainings in", "handrail-train"
     with in_one_line(config), DatasetLock(*lock) if _MAIN else nullcontext():
         checkpoint = _begin(config)
-        earlier = earlier_policy(config) if config.init and not checkpoint else None
         began = None if checkpoint is None else _checked(config, checkpoint)
-        like = earlier[1] if earlier else began if config.init else None
-        source, steps = read_source(config, began, like), resolved(config).steps
+        weights, known = checkpoint and checkpoint / MODEL, began
+        if config.init and checkpoint is None:
+            weights, known = earlier_policy(config)
+        source = read_source(config, began, known if config.init else None)
+        steps = resolved(config).steps
         losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
         decoded(asdict(_meta(source, steps, losses)), PolicyMeta, f"dataset {str(source.info.root)!r}")
         if checkpoint is None or int(checkpoint.name) < steps:
@@ -65,7 +67,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
                 settings = _settings(config, steps)
                 assert settings.policy is not None
                 learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
-                training = TrainingRun(settings, learnt, checkpoint, source.encoder, earlier and earlier[0])
+                training = TrainingRun(settings, learnt, checkpoint, weights, source.encoder)
                 for path in config.folder.glob("*") if config.overwrite and _MAIN else ():
                     remove(path)  # not before all else is sure
                 measured = out[0] if out else None, losses, config.eval_steps

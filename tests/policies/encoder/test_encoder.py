@@ -212,7 +212,7 @@ def test_in_a_checkpoint_it_says_the_same(tmp_path):
     memories = [SceneMemory(one.reads), SceneMemory(one.reads)]
     for times in ([0.0, 0.0], [0.05, 0.05], [0.10, 0.0]):
         if times[1] == 0.0:
-            memories[1].forget()
+            memories[1] = SceneMemory(one.reads)
         told = one.look(pictures, states)
         expected = np.stack([memory.take(told, row) for row, memory in enumerate(memories)])
         found = step({"observation": shown | {"observation.time": torch.tensor(times)[:, None]}})
