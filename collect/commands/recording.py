@@ -46,7 +46,7 @@ class Recording:
     Args:
         config: of the recording.
         env: of the recording.
-        people: whoever steers now at this computer; none where a script does.
+        person: whoever steers now at this computer; None where a script does.
         displays: what else watches, and hears how episodes went.
         share: returns who steers where a policy drives beside them.
 
@@ -58,15 +58,14 @@ class Recording:
         self,
         config: RecordConfig,
         env: HandrailEnv,
-        people: Sequence[Any] = (),
+        person: Any = None,
         displays: Sequence[Any] = (),
         share: Callable[[Operator], Operator] | None = None,
     ) -> None:
-        self._config, self._env, self._people = config, env, people
+        self._config, self._env, self._person = config, env, person
         self.columns = session_columns(config)
         self._recorder = Recorder(config.dataset.single_task or env.task.description, self.columns)
-        self._observers: list[Any] = [self._recorder, *displays, *people]
-        person = people[0] if people else None
+        self._observers = [each for each in (self._recorder, *displays, person) if each]
         self._session = build_session(config, env, self._observers, config.dataset.fps, person, share)
 
     def into(self, writer: EpisodeWriter) -> None:
@@ -87,7 +86,7 @@ class Recording:
             return
         config, fps = replace(self._config, cameras=""), self._config.dataset.fps
         with closing(build_env(config, fps)) as simulated:
-            session = build_session(config, simulated, (), fps, *self._people)
+            session = build_session(config, simulated, (), fps, self._person)
             replace(session, **unseen).run(seed)
 
     def episode(
@@ -101,7 +100,7 @@ class Recording:
             note: is told how it went, before an interrupt takes effect.
         """
         outcome = self._session.run(seed)
-        outcome = replace(outcome, practice=any(each.person.practises for each in self._people))
+        outcome = replace(outcome, practice=bool(self._person and self._person.person.practises))
         with interrupts.deferred():
             for observer in self._observers:
                 observer.end(outcome)
