@@ -209,12 +209,12 @@ def session_writer(config: RecordConfig, env: HandrailEnv) -> Iterator[EpisodeWr
 
 def located(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
     """Return the settings of a recording with its folder, and whether it adds to a dataset that is there."""
-    if isinstance(config.dataset, FoundDatasetConfig) and config.dataset.is_found:
+    if not isinstance(config.dataset, FoundDatasetConfig):
+        return config
+    if config.dataset.is_found:
         return _found(config, env)
-    goes_on = isinstance(config.dataset, FoundDatasetConfig) and not (config.resume or config.overwrite)
-    if goes_on and is_dataset(Layout(config.dataset.folder.absolute())):
-        return _resumed(config, env)
-    return config
+    is_there = is_dataset(Layout(config.dataset.folder.absolute()))
+    return _resumed(config, env) if is_there and not (config.resume or config.overwrite) else config
 
 
 def _resumed(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
