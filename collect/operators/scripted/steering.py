@@ -63,14 +63,13 @@ class MotionGoal:
     hand: FloatArray  # twist of the tool, world-aligned, (6,) [m/s, rad/s]
     base: FloatArray  # twist of the base in the base frame, (3,)
     focus: Focus = "hand"  # which of the two matters now
-    gripper: float = 0.0  # 0 open, 1 closed
     target: Target | None = None  # where that leads; None wants to rest
-    grippers: tuple[float, ...] = ()  # of each hand, where a task is of several; then `gripper` means nothing
+    grippers: tuple[float, ...] = ()  # of each hand, 0 open, 1 closed; all open where nothing is said
 
     @classmethod
-    def rest(cls, focus: Focus = "hand", gripper: float = 0.0) -> "MotionGoal":
+    def rest(cls, focus: Focus = "hand", grippers: tuple[float, ...] = ()) -> "MotionGoal":
         """Return the goal that nothing moves."""
-        return cls(np.zeros(6), np.zeros(3), focus, gripper)
+        return cls(np.zeros(6), np.zeros(3), focus, grippers=grippers)
 
 
 @dataclass(frozen=True)
