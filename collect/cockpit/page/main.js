@@ -1,5 +1,6 @@
 // Puts the page together: inputs up many times a second, the newest picture down.
 import { Decision } from "./decision.js";
+import { byId, set } from "./dom.js";
 import { driverWords } from "./drivers.js";
 import { Episodes } from "./episodes.js";
 import { Gamepad } from "./gamepad.js";
@@ -21,7 +22,6 @@ import { XrHands } from "./xr.js";
 import { foldPanels } from "./folds.js";
 
 const PERIOD = 25; // between two messages [ms]
-const byId = (id) => document.getElementById(id);
 const view = new View(byId("view"), (hand) => ask("hand", hand));
 let stage = null, frame = null, told = null, drawn = null;
 let groups = [], group = 0, active = 0; // of the joints that digits mean; and the hand at that time
@@ -182,7 +182,7 @@ function sayDrivers() {
   byId("drivers").hidden = !frame.drivers;
   if (!frame.drivers) return;
   const said = driverWords(frame, masks.groups, stage, { start: keyName(inputs.mapping.actions.start ?? "") });
-  if (byId("drivers").textContent !== said) byId("drivers").textContent = said;
+  set("drivers", said);
   byId("drivers").classList.toggle("mine", frame.drivers.person.length > 0);
   const [mine, its] = ["person", "policy"].map((who) => bodiesOf(new Set(frame.drivers[who].map((index) => stage.channels[index]))));
   if ([...mine, "", ...its].join() !== [...view.owned, "", ...view.its].join()) view.light_up(mine, its);
@@ -216,7 +216,7 @@ function say() {
   if (!stage || !view.isReady) return;
   if (frame && frame !== told) tell();
   const input = inputs.read(stage.channels);
-  if (byId("pad").textContent !== gamepad.says) byId("pad").textContent = gamepad.says;
+  set("pad", gamepad.says);
   if (panels.you.driving) link.drive({ ...input, view: view.azimuth });
 }
 

@@ -1,19 +1,14 @@
 // Words and buttons: what the page says besides the picture. Everything comes from the newest frame.
+import { byId, set } from "./dom.js";
 import { jointName } from "./keymap.js";
 import { stateOf } from "./states.js";
 import { centimetres } from "./way.js";
 
-const byId = (id) => document.getElementById(id);
 const STARTS = { ready: "Start", paused: "Go on", stopped: "Release" };
 const NEEDS = {
   begun: ["pause", "undo", "success", "failure"], driver: ["restart", "discard", "quit"],
   choices: ["mode", "frame", "speed", "one-joint"],
 };
-
-function set(id, text) {
-  const element = byId(id);
-  if (element.textContent !== text) element.textContent = text;
-}
 
 function button(text, act) {
   const made = document.createElement("button");

@@ -1,8 +1,8 @@
 // Sliders as a leader arm: while one is held, the arm's joints go where the sliders are.
 // A slider that was let go stands where the arm is, and moves from there: nothing jumps.
+import { ENDS } from "./dom.js";
 import { jointName } from "./keymap.js";
 
-const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
 const STEP = 0.03; // of an arrow key [rad]
 const ARROWS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 

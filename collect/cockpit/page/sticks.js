@@ -1,8 +1,7 @@
 // Two sticks for thumbs, or the mouse: where a finger is on them, they are. Each finger has its own.
+import { ENDS, write } from "./dom.js";
 import { shaped } from "./inputs.js";
 import { shortName } from "./keymap.js";
-
-const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
 
 export class TouchSticks {
   constructor(box, inputs, act) {
@@ -68,8 +67,7 @@ export class TouchSticks {
       const part = sticks.find(([each]) => each >> 1 === index)?.[1] ?? "";
       const [what] = this.inputs.channelOf(part).split(".");
       const words = `${{ joint: "joints", ee: "hand", pair: "both hands", "": "joints" }[what] ?? what}: ${said(2 * index)}`;
-      const label = stick.querySelector("span");
-      if (label.textContent !== words) label.textContent = words;
+      write(stick.querySelector("span"), words);
     });
     for (const name of ["up", "down"]) this.box.querySelector(`[data-lever=${name}]`).hidden = !this.inputs.owned.has("ee.vz");
   }

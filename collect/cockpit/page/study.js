@@ -1,5 +1,6 @@
 // Cards of a user study: what a participant reads and answers, above everything else; a strip while they drive.
 // An answer is sent until the card comes back with it: then it is on the disk.
+import { addStyle, byId } from "./dom.js";
 import { drawItem } from "./form.js";
 import { axisName, keyName } from "./keymap.js";
 
@@ -29,9 +30,7 @@ export class Study {
   }
 
   build() {
-    const style = document.createElement("link");
-    Object.assign(style, { rel: "stylesheet", href: "study.css" });
-    document.head.append(style);
+    addStyle("study.css");
     this.box = make("section", "study");
     this.box.hidden = true;
     this.box.setAttribute("role", "dialog");
@@ -48,7 +47,7 @@ export class Study {
   // What the study does not let a participant do is not there.
   stage(stage) {
     for (const [ask, id] of Object.entries(CONTROLS)) {
-      const control = document.getElementById(id);
+      const control = byId(id);
       const whole = control?.closest("label") ?? control;
       if (whole && stage.refuses.includes(ask)) whole.style.display = "none";
     }
@@ -79,7 +78,7 @@ export class Study {
     this.box.hidden = hide;
     this.strip.hidden = isCard || !this.card;
     if (this.card && !isCard) this.strip.textContent = [this.card.strip, this.card.note].filter(Boolean).join(" · ");
-    if (isCard) document.getElementById("phase").textContent = "questions";
+    if (isCard) byId("phase").textContent = "questions";
   }
 
   draw() {
