@@ -51,8 +51,6 @@ class PickPlace(Task):
 
     description: str = "Pick up the cube and put it into the bin on the other table."
     horizon: float = 90.0  # time limit [s]
-    clearance: float = 0.15
-    """Between the robot's start and anything on the floor, and between obstacles, at scale 1 [m]."""
     length: float = 0.0
     """Of the cube along its y, where it is a bar; the bin is larger by half of that [m]."""
     stages = ("approach", "grasp", "lift", "carry", "place")
@@ -72,7 +70,7 @@ class PickPlace(Task):
             _sample_cube(tables[0], world, rng, self.length),
             _sample_bin(tables[1], world, rng, self.length),
         )
-        objects = (*tables, *things, *sample_obstacles(model, q, rng, self.clearance))
+        objects = (*tables, *things, *sample_obstacles(model, q, rng))
         return Start(Scene(objects, _VIEW.scaled(world.scale)), q)
 
     def features(self, state: TaskState) -> FloatArray:

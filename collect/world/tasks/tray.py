@@ -62,8 +62,6 @@ class Tray(Task):
 
     description: str = "Carry the tray to the table and put it down without spilling the can."
     horizon: float = 90.0  # time limit [s]
-    clearance: float = 0.15
-    """Between the robot's start and anything on the floor, and between obstacles [m]."""
     hands: int = 1  # that hold it
 
     @property
@@ -78,7 +76,7 @@ class Tray(Task):
         x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
         goal = table("table", x, y, (0.6, _TABLES[self.hands - 1], rng.uniform(0.55, 0.65)))
         q, held = _sample_start(model, side, rng, self.hands)
-        objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
+        objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng))
         return Start(Scene(objects, _VIEW), q, grip=(BAR,) * self.hands)
 
     def features(self, state: TaskState) -> FloatArray:
