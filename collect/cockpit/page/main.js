@@ -41,7 +41,7 @@ const act = (name) => DO[name]();
 const notices = new Notices();
 const decision = new Decision(ask, way);
 const inputs = new Inputs(act);
-const gamepad = inputs.gamepad = new Gamepad(inputs, act, (words) => notices.say(words));
+const gamepad = new Gamepad(inputs, act, (words) => notices.say(words));
 const touch = new TouchSticks(byId("sticks"), inputs, act);
 const sliders = new Sliders(byId("sliders"), (channel) => choose(groups.findIndex(({ channels }) => channels.includes(channel))));
 const link = new Link({
@@ -170,7 +170,7 @@ function own() {
   if (before === Object.values(inputs.parts).join() && [...names].join() === [...inputs.owned].join()) return;
   inputs.owned = names;
   inputs.bank = 0;
-  inputs.turns = false;
+  touch.turns = false;
   if (!frame.drivers) view.light_up(bodiesOf(inputs.owned));
   help.draw();
   hint();

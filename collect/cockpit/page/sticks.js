@@ -5,7 +5,7 @@ import { shortName } from "./keymap.js";
 
 export class TouchSticks {
   constructor(box, inputs, act) {
-    Object.assign(this, { box, inputs, device: "touch", lift: 0, held: {}, deflected: { left: [0, 0], right: [0, 0] } });
+    Object.assign(this, { box, inputs, device: "touch", turns: false, lift: 0, held: {}, deflected: { left: [0, 0], right: [0, 0] } });
     this.knobs = [...box.querySelectorAll(".stick")];
     for (const stick of this.knobs) this.stick(stick);
     for (const lever of box.querySelectorAll("[data-lever]")) this.lever(lever, act);
@@ -41,9 +41,9 @@ export class TouchSticks {
 
   // The other thing that the sticks can do: turn the hand, or move the next joints.
   turn(lever) {
-    if ([...this.inputs.owned].some((name) => name.startsWith("ee."))) this.inputs.turns = !this.inputs.turns;
+    if ([...this.inputs.owned].some((name) => name.startsWith("ee."))) this.turns = !this.turns;
     else this.inputs.nextBank();
-    lever.setAttribute("aria-pressed", String(this.inputs.turns));
+    lever.setAttribute("aria-pressed", String(this.turns));
   }
 
   letGo() {
