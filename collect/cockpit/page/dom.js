@@ -9,6 +9,12 @@ export function write(element, words) {
 
 export const set = (id, words) => write(byId(id), words);
 
+export function button(words, act) {
+  const made = Object.assign(document.createElement("button"), { type: "button", textContent: words });
+  made.addEventListener("click", act);
+  return made;
+}
+
 export function addStyle(file) {
   document.head.append(Object.assign(document.createElement("link"), { rel: "stylesheet", href: file }));
 }

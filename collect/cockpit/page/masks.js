@@ -1,16 +1,13 @@
 // Any mask: which parts the person owns, by group, joint or single channel; choosing a mode goes back.
-import { byId, write } from "./dom.js";
+import { button, byId, write } from "./dom.js";
 import { driverOf } from "./drivers.js";
 import { jointName, shortName, wordsOf } from "./keymap.js";
 
 const OF_PAIR = ["pair", "apart"];
 
 function toggle(words, label, act) {
-  const made = document.createElement("button");
-  made.type = "button";
-  made.textContent = words;
+  const made = button(words, act);
   made.setAttribute("aria-label", label);
-  made.addEventListener("click", act);
   return made;
 }
 

@@ -1,5 +1,5 @@
 // Words and buttons: what the page says besides the picture. Everything comes from the newest frame.
-import { byId, set } from "./dom.js";
+import { button, byId, set } from "./dom.js";
 import { jointName } from "./keymap.js";
 import { stateOf } from "./states.js";
 import { centimetres } from "./way.js";
@@ -9,13 +9,6 @@ const NEEDS = {
   begun: ["pause", "undo", "success", "failure"], driver: ["restart", "discard", "quit"],
   choices: ["mode", "frame", "speed", "one-joint"],
 };
-
-function button(text, act) {
-  const made = document.createElement("button");
-  made.textContent = text;
-  made.addEventListener("click", act);
-  return made;
-}
 
 export class Panels {
   constructor(link) {

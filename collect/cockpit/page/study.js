@@ -1,6 +1,6 @@
 // Cards of a user study: what a participant reads and answers, above everything else; a strip while they drive.
 // An answer is sent until the card comes back with it: then it is on the disk.
-import { addStyle, byId } from "./dom.js";
+import { addStyle, button, byId } from "./dom.js";
 import { drawItem } from "./form.js";
 import { axisName, keyName } from "./keymap.js";
 
@@ -104,17 +104,9 @@ export class Study {
 
   buttons(card) {
     const row = make("div", "study-buttons");
-    this.next = make("button", "study-next", card.items.length ? "Next" : "Go on");
-    this.next.type = "button";
-    this.next.className = "main";
-    this.next.addEventListener("click", () => this.answer(NEXT, true));
-    row.append(this.next);
-    if (card.pause) {
-      const pause = make("button", "study-pause", "Pause: go on another time");
-      pause.type = "button";
-      pause.addEventListener("click", () => this.answer(PAUSE, true));
-      row.append(pause);
-    }
+    this.next = button(card.items.length ? "Next" : "Go on", () => this.answer(NEXT, true));
+    row.append(Object.assign(this.next, { id: "study-next", className: "main" }));
+    if (card.pause) row.append(Object.assign(button("Pause: go on another time", () => this.answer(PAUSE, true)), { id: "study-pause" }));
     return row;
   }
 
