@@ -37,10 +37,7 @@ from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 
 _HIGH = 0.20  # of the handle above the plate [m]
-_SIZES = (
-    (0.26, 0.32, _HIGH),
-    (0.26, 0.56, _HIGH),
-)  # of a tray for one hand, and for two: length, width, handle [m]
+_SIZES = (0.26, 0.32, _HIGH), (0.26, 0.56, _HIGH)  # of a tray for a hand, for two: length, width, handle [m]
 _TABLES = 0.7, 0.9  # width of the table for either [m]
 _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
 _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
