@@ -9,6 +9,11 @@ export function write(element, words) {
 
 export const set = (id, words) => write(byId(id), words);
 
+// Shows a value, unless the person has the control just now.
+export function follow(id, value) {
+  if (document.activeElement !== byId(id)) byId(id).value = value;
+}
+
 export function button(words, act) {
   const made = Object.assign(document.createElement("button"), { type: "button", textContent: words });
   made.addEventListener("click", act);

@@ -8,7 +8,7 @@ import { Help } from "./help.js";
 import { named, partsOf } from "./hands.js";
 import { Inputs } from "./inputs.js";
 import { Mapping } from "./mapping.js";
-import { BY_JOINTS, digitGroups, inForce, keyName } from "./keymap.js";
+import { BY_JOINTS, digitGroups, inForce, keyName, owns } from "./keymap.js";
 import { Link } from "./link.js";
 import { Masks } from "./masks.js";
 import { Notices } from "./notices.js";
@@ -86,8 +86,7 @@ function otherFocus() {
 // The other hand; where joints are steered, the next ones that digits mean.
 function otherHand() {
   if (!frame || !(stage?.hands.length > 1)) return;
-  const owns = (part) => [...inputs.owned].some((name) => name.startsWith(part));
-  if (owns("joint.") && !owns("ee.")) choose((group + 1) % groups.length);
+  if (owns(inputs.owned, "joint.") && !owns(inputs.owned, "ee.")) choose((group + 1) % groups.length);
   else ask("hand", stage.hands[(frame.hand + 1) % stage.hands.length].name);
 }
 
@@ -131,12 +130,11 @@ document.addEventListener("click", (event) => { // the mouse leaves no focus beh
 });
 
 function bodiesOf(owned) {
-  const has = (prefix) => [...owned].some((name) => name.startsWith(prefix));
   const bodies = stage.shapes.bodies, lit = new Set();
-  if (has("base")) lit.add("planar_base"); // by its twist or its joints
+  if (owns(owned, "base")) lit.add("planar_base"); // by its twist or its joints
   for (const { name: hand } of stage.hands) {
     const prefix = hand && `${hand}.`;
-    if (!has(`${hand || "ee"}.`) && !(hand && has("pair."))) continue;
+    if (!owns(owned, `${hand || "ee"}.`) && !(hand && owns(owned, "pair."))) continue;
     for (const name of bodies) if (name === `${prefix}gripper` || name.startsWith(`${prefix}finger`)) lit.add(name);
   }
   for (const name of owned) if (name.startsWith("joint.")) lit.add(`${name.slice(6)}_body`);

@@ -1,5 +1,5 @@
 // Any mask: which parts the person owns, by group, joint or single channel; choosing a mode goes back.
-import { button, byId, write } from "./dom.js";
+import { button, byId, follow, write } from "./dom.js";
 import { driverOf } from "./drivers.js";
 import { jointName, shortName, wordsOf } from "./keymap.js";
 
@@ -67,6 +67,6 @@ export class Masks {
     });
     this.single.forEach((button, index) => button.setAttribute("aria-pressed", String(this.mine.has(index))));
     const alone = this.mine.size === 1 && this.joints.includes([...this.mine][0]) ? String([...this.mine][0]) : "";
-    if (document.activeElement !== byId("one-joint")) byId("one-joint").value = alone;
+    follow("one-joint", alone);
   }
 }

@@ -1,5 +1,5 @@
 // Words and buttons: what the page says besides the picture. Everything comes from the newest frame.
-import { button, byId, set } from "./dom.js";
+import { button, byId, follow, set } from "./dom.js";
 import { jointName } from "./keymap.js";
 import { stateOf } from "./states.js";
 import { centimetres } from "./way.js";
@@ -131,13 +131,13 @@ export class Panels {
 
   choices(frame) {
     const mode = this.modes[frame.mode];
-    if (document.activeElement !== byId("mode")) byId("mode").value = mode ? frame.mode : "";
+    follow("mode", mode ? frame.mode : "");
     set("mode-help", mode?.help ?? "Your own mask: you steer what is lit, the robot the rest. Choose a mode to go back.");
     byId("focus").hidden = !frame.focus;
     this.hands.forEach((each, index) => each.setAttribute("aria-pressed", String(index === frame.hand)));
     for (const each of document.querySelectorAll("[data-focus]")) each.setAttribute("aria-pressed", String(each.dataset.focus === frame.focus));
-    if (document.activeElement !== byId("frame")) byId("frame").value = frame.frame;
-    if (document.activeElement !== byId("speed")) byId("speed").value = frame.speed;
+    follow("frame", frame.frame);
+    follow("speed", frame.speed);
     set("speed-said", `${Math.round(100 * frame.speed)} %`);
     byId("practice").checked = frame.practice;
     for (const box of byId("locks").querySelectorAll("input")) box.checked = frame.locked.includes(Number(box.dataset.joint));

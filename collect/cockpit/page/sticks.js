@@ -1,7 +1,7 @@
 // Two sticks for thumbs, or the mouse: where a finger is on them, they are. Each finger has its own.
 import { ENDS, write } from "./dom.js";
 import { shaped } from "./inputs.js";
-import { shortName } from "./keymap.js";
+import { owns, shortName } from "./keymap.js";
 
 export class TouchSticks {
   constructor(box, inputs, act) {
@@ -41,7 +41,7 @@ export class TouchSticks {
 
   // The other thing that the sticks can do: turn the hand, or move the next joints.
   turn(lever) {
-    if ([...this.inputs.owned].some((name) => name.startsWith("ee."))) this.turns = !this.turns;
+    if (owns(this.inputs.owned, "ee.")) this.turns = !this.turns;
     else this.inputs.nextBank();
     lever.setAttribute("aria-pressed", String(this.turns));
   }
