@@ -9,7 +9,7 @@ const ARROWS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 export class Sliders {
   // choose(channel): a joint's name or bar was clicked
   constructor(box, choose) {
-    Object.assign(this, { box, choose, device: "sliders", held: new Map(), targets: [], q: [], rows: [] });
+    Object.assign(this, { box, choose, device: "sliders", held: new Set(), targets: [], q: [], rows: [] });
   }
 
   stage(stage) {
@@ -62,7 +62,7 @@ export class Sliders {
   // The first one that is held: all joints stay where the arm is now.
   hold(index) {
     if (!this.held.size) this.targets = this.q.slice(this.base);
-    this.held.set(index, true);
+    this.held.add(index);
   }
 
   put(index, value) {
