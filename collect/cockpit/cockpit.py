@@ -22,6 +22,7 @@ from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess, open_server
 from handrail.collect.cockpit.snapshot import Snapshots
 from handrail.collect.cockpit.strain import Strain
+from handrail.collect.commands.account import next_commands
 from handrail.collect.config import RecordConfig
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
@@ -220,16 +221,20 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     check_installed(*NEEDED)
     modes = build_modes(config, env)
     server = open_server(config.cockpit, say)
-    folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
+    folder = config.dataset.folder
     say(f"Episodes go to {folder}. To end: End recording on the page, or Ctrl-C here.")
-    then = [
-        f"handrail-inspect {folder}",
-        f"handrail-replay {folder}",
-        f"handrail-train {folder} --output outputs/policy",
-    ]
-    settings = {"folder": folder, "wanted": wanted, "next": then, "say": say, "shared": bool(config.policy)}
-    settings["refuses"] = ("undo",) if env.real else ()  # nothing that moved goes back by itself
-    return Cockpit(env.model, modes, config.mode_name, server, **settings)
+    return Cockpit(
+        env.model,
+        modes,
+        config.mode_name,
+        server,
+        refuses=("undo",) if env.real else (),  # nothing that moved goes back by itself
+        folder=str(folder),
+        wanted=config.dataset.num_episodes,
+        next=next_commands(folder),
+        say=say,
+        shared=bool(config.policy),
+    )
 
 
 def _known(limit: float) -> float | None:

@@ -38,12 +38,9 @@ def drivers(intent: Intent | None, model: RobotModel, tools: Sequence[Pose], q: 
     said: dict[str, Any] = {
         name: np.flatnonzero(part.mask).tolist() if part else [] for name, part in parts.items()
     }
-    owners: Sequence[str] = (PERSON,) * len(tools) if intent else ()
-    hands: list[list[list[float]]] = [[] for _ in tools]
-    base: list[list[float]] = []
-    if isinstance(intent, Intents):
-        owners = intent.of_grippers
-        hands, base = _leads(intent, model, tools, q)
+    alone = (PERSON,) * len(tools) if intent else ()
+    owners = intent.of_grippers if isinstance(intent, Intents) else alone
+    hands, base = _leads(intent, model, tools, q)
     return said | {"grippers": list(owners), "leads": hands, "lead_base": base}
 
 
@@ -56,12 +53,13 @@ def _part(intent: Intent, name: str) -> Intent | None:
 
 
 def _leads(
-    intent: Intents, model: RobotModel, tools: Sequence[Pose], q: FloatArray
+    intent: Intent | None, model: RobotModel, tools: Sequence[Pose], q: FloatArray
 ) -> tuple[list[list[list[float]]], list[list[float]]]:
     """Return where the policy's rows lead, one after the other: `x ← x + Δt û`, joints along q."""
     hands: list[list[list[float]]] = [[] for _ in tools]
     base: list[list[float]] = []
-    source, channels = intent.source(POLICY), Channels.of(model.description)
+    source = intent.source(POLICY) if isinstance(intent, Intents) else None
+    channels = Channels.of(model.description)
     if source is None:
         return hands, base
     plan = source.predict

@@ -138,7 +138,7 @@ class Hub:
         if stops:  # anyone who sees danger may
             self._presses.extend(filter(None, presses.values()))
             self._stopped = now
-            self._pipe.send_surely(Kind.STOP, instead_of=(Kind.STOP, Kind.ASK))
+            self._pipe.send_surely(Kind.STOP, instead_of=(Kind.ASK,))
         for number, each in enumerate(said if page in self._pages else ()):
             may = page.may_say(now)
             try:
@@ -201,7 +201,7 @@ class Hub:
 
     def _lose(self) -> None:
         """Tell the recording that nobody drives now: who does next has to begin anew."""
-        self._pipe.send_surely(Kind.LOST, instead_of=(Kind.LOST, Kind.ASK))
+        self._pipe.send_surely(Kind.LOST, instead_of=(Kind.ASK,))
 
     def _tell_all(self) -> None:
         for page in self._pages:

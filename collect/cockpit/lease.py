@@ -1,5 +1,6 @@
 """The lease: one page drives at a time; the others watch, and may ask for it."""
 
+import math
 import time
 from collections.abc import Callable
 
@@ -16,33 +17,30 @@ class Lease:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self.holder = self.asking = ""
-        self._clock, self._left_at = clock, -1e9
-        self._is_there = False
+        self._clock, self._ends = clock, math.inf  # for whoever left; never while the holder is there [s]
 
     def take(self, page: str) -> bool:
         """Let a page drive if nobody does, or it drove a moment ago; else take note that it asks."""
         if not self.is_free_for(page):
             self.asking = page
             return False
-        self.holder, self._is_there = page, True
+        self.holder, self._ends = page, math.inf
         self.asking = "" if self.asking == page else self.asking
         return True
 
     def is_free_for(self, page: str) -> bool:
         """Whether a page may drive at once."""
-        is_reserved = self._is_there or self._clock() <= self._left_at + RESERVED
-        return page == self.holder or not self.holder or not is_reserved
+        return page == self.holder or not self.holder or self._clock() > self._ends
 
     def give(self, page: str) -> None:
         """Let whoever asks drive instead of a page, or nobody."""
         if page == self.holder:
-            self.holder, self.asking = self.asking, ""
-            self._is_there = bool(self.holder)
+            self.holder, self.asking, self._ends = self.asking, "", math.inf
 
     def leave(self, page: str) -> None:
         """Take note that a page is gone; for a moment it may come back."""
         if page == self.holder:
-            self._is_there, self._left_at = False, self._clock()
+            self._ends = self._clock() + RESERVED
         if page == self.asking:
             self.asking = ""
 
@@ -53,4 +51,4 @@ class Lease:
 
     def drives(self, page: str) -> bool:
         """Whether it is this page that drives."""
-        return self._is_there and page == self.holder
+        return page == self.holder and self._ends == math.inf

@@ -78,7 +78,7 @@ class Pipe:
         Args:
             kind: of the message.
             value: content of the message.
-            instead_of: kinds that are out of date with it: those that wait are dropped.
+            instead_of: kinds that are out of date with it: those that wait are dropped, as is the same one.
         """
         message = kind, _encoded(kind, value)
         for each in [each for each in self._waiting if each[0] in instead_of or each == message]:

@@ -23,10 +23,11 @@ _DROPPED = {
     EpisodeEvent.RESTART: "begun again",
     EpisodeEvent.QUIT: "not finished",
 }
-_NEXT = """Next:
-  {bin}handrail-inspect {root}    # what was recorded
-  {bin}handrail-replay {root}    # do the same again
-  {bin}handrail-train {root} --output outputs/policy"""
+_NEXT = (
+    "handrail-inspect {root}    # what was recorded",
+    "handrail-replay {root}    # do the same again",
+    "handrail-train {root} --output outputs/policy",
+)
 
 
 def _why_dropped(outcome: Outcome) -> str:
@@ -92,7 +93,7 @@ class RecordingLog:
         if advice := packing_advice(root):
             console.print(advice)
         if OPERATORS.find(config.operator).interactive and self.outcomes:
-            console.print(*next_commands(root).splitlines(), sep="\n")
+            console.print("Next:", *(f"  {command}" for command in next_commands(root)), sep="\n")
 
     def _summary(self, config: RecordConfig) -> Table:
         outcomes = self.outcomes
@@ -118,9 +119,9 @@ class RecordingLog:
         return table
 
 
-def next_commands(root: Path) -> str:
-    """Return what to try with a dataset."""
-    return _NEXT.format(root=_from_here(root), bin=command_prefix())
+def next_commands(root: Path) -> list[str]:
+    """Return what to try with a dataset, a command a line."""
+    return [command_prefix() + command.format(root=_from_here(root)) for command in _NEXT]
 
 
 def command_prefix() -> str:

@@ -5,13 +5,12 @@ from handrail.collect.commands.config import DemoConfig
 from handrail.collect.commands.record import record
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
-from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.collect.config import REPO_ID, DatasetConfig, RecordConfig
 from handrail.collect.session.film import save_sheet
 from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal
 
-_REPO = "handrail/demo"
 NEXT = """Next:
   {bin}handrail-cockpit    # drive yourself, in the browser
   {bin}handrail-inspect {root}
@@ -32,7 +31,7 @@ def demo(config: DemoConfig) -> int:
         console.print(f"Without pictures: {trouble}")
     cameras = "" if trouble else "wrist,scene"
     root = config.folder / "dataset"
-    dataset = DatasetConfig(repo_id=_REPO, root=str(root), num_episodes=config.episodes)
+    dataset = DatasetConfig(repo_id=REPO_ID, root=str(root), num_episodes=config.episodes)
     console.print(f"Recording {config.episodes} episodes: the operator steers the hand, the MPC the rest …")
     code = record(RecordConfig(dataset=dataset, cameras=cameras, overwrite=config.overwrite))
     if code:
@@ -44,6 +43,6 @@ def demo(config: DemoConfig) -> int:
         console.print(f"Picture: {sheet}")
     console.print(f"Dataset: {root}")
     flags = f" --cameras {cameras}" if cameras else ""
-    after = NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=command_prefix())
+    after = NEXT.format(root=root, folder=config.folder, repo=REPO_ID, cameras=flags, bin=command_prefix())
     console.print(*after.splitlines(), sep="\n")
     return 0

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from handrail.collect.commands.account import RecordingLog
 from handrail.collect.commands.recording import (
@@ -29,6 +29,9 @@ from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
+
+if TYPE_CHECKING:
+    from handrail.collect.lekiwi.link import Link
 
 Share = Callable[[RecordConfig, Operator, HandrailEnv], Operator]
 
@@ -58,8 +61,7 @@ def _record_here(
     if interactive or config.robot_client:
         come_first()
     with ExitStack() as stack:
-        people: list[Any] = []
-        env = _opened(config, interactive, stack, people)
+        env, link = _opened(config, interactive, stack)
         shown = config.display_data, config.display_web, config.display_save
         displays = [stack.enter_context(closing(Display(*shown, console.print)))] if any(shown) else []
         build_mode(config, env.model)  # a wrong mask, or cameras without GL, show before anything is written
@@ -68,11 +70,13 @@ def _record_here(
         config = located(config, env)
         if interactive and not config.resume:  # before a person's page is opened, or their device
             check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
+        person: Any = None
         if interactive:  # whoever steers now at this computer
-            person = resolved(operator.build)(config, env, console.print)
-            people.append(stack.enter_context(closing(person)))
+            person = stack.enter_context(closing(resolved(operator.build)(config, env, console.print)))
+            if link:
+                link.asked = person.between
         beside = (lambda person: share(config, person, env)) if share else None
-        recording = Recording(config, env, people, displays, beside)
+        recording = Recording(config, env, person, displays, beside)
         writer = stack.enter_context(session_writer(config, env))
         _print_state(writer, console)
         recording.into(writer)
@@ -83,7 +87,7 @@ def _record_here(
         count = config.dataset.num_episodes
         with (
             log.noting("the open episode is dropped, the saved ones are whole"),
-            WorkBar(console, "recording", count, people) as bar,
+            WorkBar(console, "recording", count, [person]) as bar,
         ):
             for _ in recording.episodes(writer, writer.num_episodes + count, log.add):
                 bar.show(completed=len(log.outcomes), words=log.words)
@@ -126,13 +130,12 @@ def _print_state(writer: EpisodeWriter, console: Terminal) -> None:
         console.print(f"Adds to {writer.root}; episodes there: {writer.num_episodes}")
 
 
-def _opened(config: RecordConfig, interactive: bool, stack: ExitStack, people: list[Any]) -> HandrailEnv:
-    """Return the environment, with the link to a robot if it is no simulation; people may stop that."""
+def _opened(config: RecordConfig, interactive: bool, stack: ExitStack) -> tuple[HandrailEnv, "Link | None"]:
+    """Return the environment, and the link to the robot if it is no simulation."""
     if not config.robot_client:
-        return stack.enter_context(closing(build_env(config, config.dataset.fps, render=interactive)))
+        return stack.enter_context(closing(build_env(config, config.dataset.fps, render=interactive))), None
     from handrail.collect.lekiwi.client_plant import open_client  # loads LeRobot
 
     env, link = open_client(config)
-    link.asked = lambda: people[0].between() if people else None
     stack.callback(link.close)
-    return stack.enter_context(closing(env))
+    return stack.enter_context(closing(env)), link

@@ -46,7 +46,7 @@ class Recording:
     Args:
         config: of the recording.
         env: of the recording.
-        people: whoever steers now at this computer; none where a script does.
+        person: whoever steers now at this computer; None where a script does.
         displays: what else watches, and hears how episodes went.
         share: returns who steers where a policy drives beside them.
 
@@ -58,15 +58,14 @@ class Recording:
         self,
         config: RecordConfig,
         env: HandrailEnv,
-        people: Sequence[Any] = (),
+        person: Any = None,
         displays: Sequence[Any] = (),
         share: Callable[[Operator], Operator] | None = None,
     ) -> None:
-        self._config, self._env, self._people = config, env, people
+        self._config, self._env, self._person = config, env, person
         self.columns = session_columns(config)
         self._recorder = Recorder(config.dataset.single_task or env.task.description, self.columns)
-        self._observers: list[Any] = [self._recorder, *displays, *people]
-        person = people[0] if people else None
+        self._observers = [each for each in (self._recorder, *displays, person) if each]
         self._session = build_session(config, env, self._observers, config.dataset.fps, person, share)
 
     def into(self, writer: EpisodeWriter) -> None:
@@ -87,7 +86,7 @@ class Recording:
             return
         config, fps = replace(self._config, cameras=""), self._config.dataset.fps
         with closing(build_env(config, fps)) as simulated:
-            session = build_session(config, simulated, (), fps, *self._people)
+            session = build_session(config, simulated, (), fps, self._person)
             replace(session, **unseen).run(seed)
 
     def episode(
@@ -101,7 +100,7 @@ class Recording:
             note: is told how it went, before an interrupt takes effect.
         """
         outcome = self._session.run(seed)
-        outcome = replace(outcome, practice=any(each.person.practises for each in self._people))
+        outcome = replace(outcome, practice=bool(self._person and self._person.person.practises))
         with interrupts.deferred():
             for observer in self._observers:
                 observer.end(outcome)
@@ -210,12 +209,12 @@ def session_writer(config: RecordConfig, env: HandrailEnv) -> Iterator[EpisodeWr
 
 def located(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
     """Return the settings of a recording with its folder, and whether it adds to a dataset that is there."""
-    if isinstance(config.dataset, FoundDatasetConfig) and config.dataset.is_found:
+    if not isinstance(config.dataset, FoundDatasetConfig):
+        return config
+    if config.dataset.is_found:
         return _found(config, env)
-    goes_on = isinstance(config.dataset, FoundDatasetConfig) and not (config.resume or config.overwrite)
-    if goes_on and is_dataset(Layout(config.dataset.folder.absolute())):
-        return _resumed(config, env)
-    return config
+    is_there = is_dataset(Layout(config.dataset.folder.absolute()))
+    return _resumed(config, env) if is_there and not (config.resume or config.overwrite) else config
 
 
 def _resumed(config: RecordConfig, env: HandrailEnv) -> RecordConfig:

@@ -19,7 +19,7 @@ from handrail.collect.commands.config import RenderConfig
 from handrail.collect.commands.replay import replay_one_of
 from handrail.collect.config import SessionConfig
 from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.job import Job
+from handrail.collect.execution.job import part_jobs
 from handrail.collect.execution.pool import RENDERING
 from handrail.collect.session.recorded import COLUMN as SETTINGS
 from handrail.collect.session.recorded import recorded_settings
@@ -40,8 +40,6 @@ from handrail.datasets.recording.slice import TRIMMED
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.atomic import beside, explained, remove
 
-_FEW = 5  # episodes of a part at least
-_MANY = 1000  # parts at most
 _PICTURES = 32  # of a preview
 _WIDTH = 320  # of one of them [px]
 _LONGEST = 125  # that a picture stays [ms]; a long episode goes by faster than it was
@@ -55,8 +53,7 @@ def render(config: RenderConfig) -> None:
             settings.check()
         first, end = _begun(config, dataset), len(dataset.rows)
     folder = beside(config.target, "pictures")
-    size = max(_FEW, -(-(end - first) // _MANY))
-    jobs = [_job(config, folder, begin, min(size, end - begin)) for begin in range(first, end, size)]
+    jobs = part_jobs(draw, config, folder / "part", first, end)
     with Execution(config, "drawing", Terminal(stderr=True), RENDERING) as execution:
         for result in execution.run(jobs):
             if result.error:
@@ -102,12 +99,6 @@ def _manifest(config: RenderConfig, dataset: OpenDataset) -> Manifest:
     observed = {key: each for key, each in numbers.items() if key.startswith("observation.")}
     name = config.name or manifest.repo_id
     return replace(manifest, repo_id=name, features=observed | cameras | numbers)
-
-
-def _job(config: RenderConfig, folder: Path, first: int, episodes: int) -> Job:
-    part = folder / f"part-{first:07d}"
-    name = f"episodes {first} to {first + episodes - 1}"
-    return Job(name, draw, (config, part, first, episodes), size=episodes, log=part.with_suffix(".log"))
 
 
 def draw(config: RenderConfig, part: Path, first: int, episodes: int) -> None:

@@ -1,6 +1,6 @@
 """Replays a recorded episode's commands and reports how far the motion deviates."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -131,31 +131,27 @@ def replay_one_of(
     skipped = _count(row.get(TRIMMED), _MOST_TRIMMED) or 0  # the robot stood still then
     limit = (skipped + len(actions) - 0.5) / info.fps
     config = replace(recorded_settings(row, said), time_limit=limit, **seen)
-    taken: Pictures = []
+    taken, played = Pictures(), list[tuple[FloatArray, int, bool]]()
     with ExitStack() as stack:
         env = stack.enter_context(closing(build_env(config, info.fps, render=bool(pictures or video))))
         _check_state(recorded, env, where)
         film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
         moments = skipped + np.linspace(0, len(actions) - 1, pictures).round().astype(int)
-
-        def before(frame: int, observation: Observation) -> None:
+        still = np.where(np.arange(actions.shape[1]) < env.model.size, np.float32(0.0), actions[0])
+        actions = np.vstack([np.tile(still, (skipped, 1)), actions])
+        for frame, (before, contacts, success) in enumerate(_run(env, seed, actions, info.fps)):
             if frame >= skipped:
-                observe(observation)
-
-        def see(frame: int) -> None:
+                played.append((before["agent_pos"], contacts, success))
+                observe(before)
             picture = env.render() if film or frame in moments else None
             if picture is not None and frame in moments:
                 taken.append(picture)
             if picture is not None and film:
                 film.add(picture)
-
-        still = np.where(np.arange(actions.shape[1]) < env.model.size, np.float32(0.0), actions[0])
-        actions = np.vstack([np.tile(still, (skipped, 1)), actions])
-        states, contacts, success = _run(env, seed, actions, info.fps, see, before)
-    states = states[skipped:]
-    if not states:
+    if not played:
         raise HandrailError(f"{where}: the task ended before the first recorded frame")
-    difference = np.abs(np.array(states) - recorded[: len(states)])
+    states, (_, contacts, success) = np.array([state for state, _, _ in played]), played[-1]
+    difference = np.abs(states - recorded[: len(states)])
     found = Replay(
         episode=episode,
         names=env.agent_names,
@@ -185,13 +181,8 @@ def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
 
 
 def _run(
-    env: HandrailEnv,
-    seed: int,
-    actions: np.ndarray,
-    fps: float,
-    see: Callable[[int], None],
-    before: Callable[[int, Observation], None],
-) -> tuple[list[FloatArray], int, bool]:
+    env: HandrailEnv, seed: int, actions: np.ndarray, fps: float
+) -> Iterator[tuple[Observation, int, bool]]:
     """Send the commands of an episode until it is over.
 
     Args:
@@ -199,18 +190,16 @@ def _run(
         seed: of the episode.
         actions: velocities at the ends of the frames, and grippers, (T, n + h).
         fps: frames a second.
-        see: is told the number of every frame at its end.
-        before: is told it at the frame's beginning, with what is observed.
 
-    Returns:
-        The states before the frames, how many contacts began, and whether the task was done.
+    Yields:
+        At the end of every frame what was observed at its beginning, how many contacts have begun so far, and
+        whether the task is done.
     """
-    states, onsets, contacts = list[FloatArray](), 0, 0
-    observation, info = env.reset(seed=seed)
-    for frame in range(len(actions)):
-        velocities, grippers = np.split(actions[frame].astype(np.float64), [env.model.size])
-        states.append(observation["agent_pos"])
-        before(frame, observation)
+    onsets = contacts = 0
+    observation, _ = env.reset(seed=seed)
+    for action in actions:
+        before = observation
+        velocities, grippers = np.split(action.astype(np.float64), [env.model.size])
         last = np.array(env.state().commanded)
         command = Command(np.stack([last, velocities, np.zeros(len(last))]), 1.0 / fps)
         for step in range(1, round(env.fps / fps) + 1):
@@ -218,7 +207,6 @@ def _run(
             observation, _, terminated, truncated, info = env.step(sent)
             onsets, contacts = onsets + max(info["contacts"] - contacts, 0), info["contacts"]
             if terminated or truncated:
-                see(frame)
-                return states, onsets, bool(info["is_success"])
-        see(frame)
-    return states, onsets, bool(info["is_success"])
+                yield before, onsets, bool(info["is_success"])
+                return
+        yield before, onsets, bool(info["is_success"])

@@ -21,7 +21,7 @@ from handrail.collect.commands.account import RecordingLog
 from handrail.collect.commands.recording import Recording, open_writer
 from handrail.collect.config import RecordConfig
 from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.job import Job
+from handrail.collect.execution.job import Job, part_jobs
 from handrail.collect.session.build import build_env
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import settings_json
@@ -41,8 +41,6 @@ from handrail.datasets.storage.lock import HeldError
 from handrail.datasets.storage.strict_json import load_json, write_json
 
 _FORMAT = "handrail.shards/1"
-_FEW = 5  # episodes of a shard at least
-_MANY = 1000  # shards of a recording at most
 _DYING = 60.0  # of a worker whose parent or computer is lost [s]
 _MOMENT = 0.1  # [s]
 
@@ -102,8 +100,7 @@ class Shards:
                 f"dataset {str(self.root)!r}: expected {first} episodes, as when {str(self.folder)!r}"
                 f" was begun, found {episodes}; remove the one or the other"
             )
-        size = max(_FEW, -(-(end - first) // _MANY))
-        return [self._job(begin, min(size, end - begin)) for begin in range(episodes, end, size)]
+        return part_jobs(record_shard, self._config, self.folder / "shard", episodes, end)
 
     def record(self, jobs: Sequence[Job], log: RecordingLog, execution: Execution) -> None:
         """Record the shards, and make one dataset of what was there before and of them, in order.
@@ -138,16 +135,6 @@ class Shards:
         dataset = self._config.dataset
         names = ("name", "fps", "single_task", "num_episodes")
         return json.loads(settings_json(self._config)) | {name: getattr(dataset, name) for name in names}
-
-    def _job(self, first: int, episodes: int) -> Job:
-        folder = self.folder / f"shard-{first:07d}"
-        return Job(
-            f"episodes {first} to {first + episodes - 1}",
-            record_shard,
-            (self._config, folder, first, episodes),
-            size=episodes,
-            log=folder.with_suffix(".log"),
-        )
 
     def _merge(self, jobs: Sequence[Job]) -> None:
         roots = [self.root] * bool(self._plan.first) + [jobs[0].arguments[1]]

@@ -45,11 +45,14 @@ def has_terminal() -> bool:
 
 
 class KeyTerminal:
-    """The terminal of standard input."""
+    """The terminal of standard input.
+
+    Attributes:
+        tells_releases: whether it tells also when keys go up.
+    """
 
     def __init__(self) -> None:
-        self._file = -1
-        self._tells_releases = False
+        self._file, self.tells_releases = -1, False
 
     def open(self) -> None:
         """Take it."""
@@ -81,7 +84,7 @@ class KeyTerminal:
 
     def tell_releases(self) -> None:
         """Let it tell also when keys go up."""
-        self._tells_releases = True
+        self.tells_releases = True
         self.write(_KEYS_BEGIN)
 
     def read(self, patience: float) -> bytes:
@@ -103,7 +106,7 @@ class KeyTerminal:
             return
         import termios
 
-        self.write((_KEYS_END if self._tells_releases else b"") + _FOCUS_END)
+        self.write((_KEYS_END if self.tells_releases else b"") + _FOCUS_END)
         with contextlib.suppress(termios.error):
             termios.tcsetattr(self._file, termios.TCSAFLUSH, self._before)
         self._forget()
@@ -111,7 +114,7 @@ class KeyTerminal:
 
     def _forget(self) -> None:
         os.close(self._file)
-        self._file, self._tells_releases = -1, False
+        self._file, self.tells_releases = -1, False
 
 
 @dataclass
@@ -141,7 +144,7 @@ class Keyboard:
         self._bytes = KeyBytes(self.stops)
         self._held: dict[str, float] = {}
         self._last = "", 0.0  # key that came, and when [s]
-        self._tells_releases, self._in_focus = False, True
+        self._in_focus = True
         self._heard = self._asked = self._round_trip = 0.0
         self._waits = False  # for an answer
         if self.supervises and _IN_BETWEEN & os.environ.keys():
@@ -158,9 +161,10 @@ class Keyboard:
             self._round_trip, self._waits = now - self._asked, False
         self._heard = now if data else self._heard
         presses = [key.name for key in self._bytes.take(data, now) if self._takes(key, now)]
-        if not self._tells_releases:
+        if not self.terminal.tells_releases:
             self._held = {name: since for name, since in self._held.items() if now - since <= HELD}
-        silent = (self.supervises or (self._tells_releases and bool(self._held))) and self._is_silent(now)
+        asks = self.supervises or (self.terminal.tells_releases and bool(self._held))
+        silent = asks and self._is_silent(now)
         return DeviceInput(
             self._heard if silent else now,
             dict.fromkeys(self._held, 1.0),
@@ -178,7 +182,6 @@ class Keyboard:
         if key.name == INTERRUPT:
             _thread.interrupt_main()
         elif key.name == TELLS_RELEASES:
-            self._tells_releases = True
             self.terminal.tell_releases()
         elif key.name in (FOCUS_IN, FOCUS_OUT):
             self._in_focus = key.name == FOCUS_IN
@@ -188,7 +191,7 @@ class Keyboard:
         elif key.name != THERE:
             last, before = self._last
             self._last, self._held[key.name] = (key.name, now), now
-            again = not self._tells_releases and key.name == last and now - before < _AGAIN
+            again = not self.terminal.tells_releases and key.name == last and now - before < _AGAIN
             return key.name in self.stops or (key.change == "down" and not again)
         return False
 

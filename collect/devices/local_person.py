@@ -72,7 +72,7 @@ class LocalPerson:
         beside: DeviceReader | None = None,
         follower: Follower | None = None,
     ) -> None:
-        self.person, self._main, self._beside, self._follower = person, main, beside, follower
+        self.person, self._main, self._follower = person, main, follower
         self._sources = [main, beside] if beside else [main]
         self._moving = self._sources[-1] if follower else main  # the one with the dead-man
         self._card = Card(person, main.device.name, [source.controls for source in self._sources])

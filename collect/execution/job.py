@@ -17,6 +17,7 @@ from handrail.controllers.interrupts import interrupted
 from handrail.datasets.presentation.terminal import Terminal
 
 TRIES = 3  # of a job whose process or computer is lost
+_FEW, _MANY = 5, 1000  # episodes of a part at least, and parts at most
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,24 @@ class Job:
     """Its part of all the work, for the progress bar."""
     log: Path | None = None
     """Where its output goes, if it runs in a process of its own."""
+
+
+def part_jobs(call: Callable[..., Any], config: Any, stem: Path, first: int, end: int) -> list[Job]:
+    """Return jobs that do episodes in parts of a few, each a dataset of its own, whoever does which.
+
+    Args:
+        call: does a part, `(config, folder, first, episodes)`.
+        config: of the whole.
+        stem: of the parts' folders, which get the number of their first episode.
+        first: number of the first episode in the whole.
+        end: number after the last.
+    """
+    size, jobs = max(_FEW, -(-(end - first) // _MANY)), list[Job]()
+    for begin in range(first, end, size):
+        count, folder = min(size, end - begin), stem.with_name(f"{stem.name}-{begin:07d}")
+        name, log = f"episodes {begin} to {begin + count - 1}", folder.with_suffix(".log")
+        jobs.append(Job(name, call, (config, folder, begin, count), size=count, log=log))
+    return jobs
 
 
 @dataclass(frozen=True)

@@ -138,21 +138,17 @@ class Pusher:
         self._simulation = env.simulation
         self._pushes = sample_pushes(seed, env.task.horizon)
         effort, base = env.model.description.limits.effort, len(env.model.description.base.joints)
-        self._base = float(np.min(effort[: min(base, 2)], initial=np.inf)) * (1.0 + _BASE_EXCESS * self._size)
+        held = float(np.min(effort[: min(base, 2)])) if base else 0.0  # one that stands fixed: at the hand
+        self._base = held * (1.0 + _BASE_EXCESS * self._size)
         self._hand = float(np.max(effort[base:])) * (_HAND_HELD + _HAND_EXCESS * self._size)
-        self._movable = base > 0
 
     def act(self) -> None:
         """Set the forces of the control period that begins now."""
         now, forces = self._simulation.time, {True: np.zeros(3), False: np.zeros(3)}
         for push in self._pushes:
             if push.start <= now < push.end:
-                forces[push.hand] += push.direction * self._strength(push)
+                forces[push.hand] += push.direction * (self._hand if push.hand else self._base)
         self._simulation.push(forces[False], forces[True])
-
-    def _strength(self, push: Push) -> float:
-        """Return how strong a push is [N]; a robot that stands fixed is pushed at its hand only."""
-        return self._hand if push.hand else self._base if self._movable else 0.0
 
 
 def sample_shifted(task: Task, size: float, model: RobotModel, rng: np.random.Generator) -> Start:

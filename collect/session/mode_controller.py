@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 
 from handrail.collect.operators.modes import MASK, TeleopMode, always
+from handrail.collect.session.loop import Aiming
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.interface.channels import Channels
@@ -59,8 +60,8 @@ class ModeController:
 
     def aim(self, goal: Pose) -> None:
         """Say where the hand is to be brought now, to a controller that takes that."""
-        if hasattr(self._controller, "aim"):
-            self._controller.aim(goal)  # pyright: ignore[reportAttributeAccessIssue]
+        if isinstance(self._controller, Aiming):
+            self._controller.aim(goal)
 
     @property
     def _controller(self) -> Controller:

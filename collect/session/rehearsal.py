@@ -26,7 +26,7 @@ class Rehearsal:
 
     def __init__(self, model: RobotModel, modes: Mapping[str, TeleopMode]) -> None:
         self._modes = tuple(modes.values())
-        self._meaning, self._hand = InputMeaning(model, self._modes[0]), model.hand.name
+        self._meaning, self._hand = InputMeaning(model), model.hand.name
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin."""

@@ -61,7 +61,7 @@ class Driving:
         self._cockpit = Cockpit(
             env.model, {name: modes[name] for name in offered}, mode, self._server, refuses
         )
-        self._recording = Recording(config, env, [self._cockpit])
+        self._recording = Recording(config, env, self._cockpit)
         self._recording.into(writer)
         self._recording.warm_up(seed)
         self._cockpit.begin(env, seed)  # the card that comes says keys: of this robot and task

@@ -47,7 +47,7 @@ class Contacts:
         self._pairs.clear()
 
     def look(self, data: MjData) -> None:
-        """Remember the forbidden contacts of this instant, of which there are some contacts."""
+        """Remember the forbidden contacts of this instant, at which something touches."""
         touching = data.contact.geom
         place = touching.tobytes()  # mostly as at the instant before
         if place not in self._seen:

@@ -74,6 +74,5 @@ import mujoco as _mujoco  # noqa: E402
 mujoco: Any = _mujoco  # it comes without type stubs, and so do its classes
 type MjSpec = Any
 type MjsBody = Any
-type MjsGeom = Any
 type MjModel = Any
 type MjData = Any

@@ -18,13 +18,7 @@ from handrail.controllers.robot.shape import Obstacle, Shape
 _BOUND = 100.0  # nothing here is larger, in any unit
 MOST = 32  # things
 WIDTH = 21  # numbers of each: kind, lengths (3), position (3), rotation (9), velocity (3), work surface, hand
-_LENGTHS = {
-    "": 0,
-    "box": 3,
-    "capsule": 2,
-    "sphere": 1,
-    "cylinder": 2,
-}  # of a kind; the first: nothing is there
+_LENGTHS = {"": 0, "box": 3, "capsule": 2, "sphere": 1, "cylinder": 2}  # of a kind; "": nothing is there
 _KINDS = list(_LENGTHS)
 
 

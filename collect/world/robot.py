@@ -15,7 +15,7 @@ from handrail.collect.world.stage import new_stage
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel
-from handrail.controllers.robot.parts import EndEffector, Gripper, PlacedShape, Placement
+from handrail.controllers.robot.parts import EndEffector, PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes
 
 BASE_BODY = "planar_base"
@@ -43,11 +43,7 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> M
         joint, at = _place(model, camera.frame, Placement(np.array(camera.position), camera.axes))
         pose = geometry.pose(at.translation, at.rotation)
         bodies[joint].add_camera(name=camera.name, fovy=camera.fovy, **pose)
-    jaws = [
-        _add_hand(spec, model, hand, hand.gripper, bodies, grips)
-        for hand in model.description.hands
-        if hand.gripper
-    ]
+    jaws = [_add_hand(spec, model, hand, bodies, grips) for hand in model.description.hands]
     _add_pairs(spec, model)
     _add_servos(spec, model)
     if meshes:
@@ -66,14 +62,11 @@ def grasp_geoms(model: RobotModel) -> tuple[str, ...]:
 
 
 def _add_hand(
-    spec: MjSpec,
-    model: RobotModel,
-    hand: EndEffector,
-    gripper: Gripper,
-    bodies: list[MjsBody],
-    grips: bool,
+    spec: MjSpec, model: RobotModel, hand: EndEffector, bodies: list[MjsBody], grips: bool
 ) -> tuple[str, MjsBody, pin.SE3] | None:
     """Add a hand's gripper; return the URDF's link that turns, its body, and its zero on the hand's body."""
+    if (gripper := hand.gripper) is None:
+        return None
     joint, frame = _place(model, gripper.frame, gripper.placement)
     if gripper.jaw is None:
         add_gripper(spec, hand, bodies[joint], frame, None, grips)

@@ -16,7 +16,7 @@ from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _AWAY = 0.08  # [m]
-_OPEN = 0.8  # share of the stroke from which a gripper is open
+OPEN = 0.8  # share of the stroke from which a gripper is open
 _LAID_OUT = 1.49  # of the tool ahead of the base's centre at home [m]
 
 
@@ -92,7 +92,7 @@ class TaskState:
         """
         hand = self.hand if hand is None else hand
         away = float(np.linalg.norm(self.tools[hand].position - place))
-        return away >= _AWAY * self.scale and self.openings[hand] > _OPEN
+        return away >= _AWAY * self.scale and self.openings[hand] > OPEN
 
     def pose(self, name: str) -> Pose:
         """Return where an object is."""

@@ -8,6 +8,7 @@ import numpy as np
 from collect_helpers import environment
 
 from handrail.collect.cockpit.cockpit import Cockpit
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.collect.config import RecordConfig
@@ -29,14 +30,14 @@ class Bench:
         intent: the newest one; None while the person does not drive.
         events: what was said of the episode, pauses left out.
         address: of the page.
-        server: of the page.
+        card: to be shown next, by the thread that has the server.
     """
 
     def __init__(self, env, mode):
         modes = build_modes(RecordConfig(task="reach"), env)
-        self._env, self.server = env, ServerProcess(CockpitConfig(port=0, open=False))
-        self.address = self.server.address
-        self.cockpit = Cockpit(env.model, modes, mode, self.server)
+        self._env, self._server = env, ServerProcess(CockpitConfig(port=0, open=False))
+        self.address, self.card = self._server.address, None
+        self.cockpit = Cockpit(env.model, modes, mode, self._server)
         self.intent, self.events, self.seed = None, [], 0
         self._over, self._is_begun = threading.Event(), True
         self._thread = threading.Thread(target=self._run)
@@ -89,6 +90,9 @@ class Bench:
         while not self._over.wait(_PERIOD):
             if not self._is_begun:
                 self._begin()
+            if card := self.card:
+                self._server.pipe.send_surely(Kind.CARD, card)
+                self.card = None
             answer = self.cockpit.act(self.view())
             self.intent = answer if isinstance(answer, Intent) else None
             if isinstance(answer, EpisodeEvent) and answer is not EpisodeEvent.PAUSE:

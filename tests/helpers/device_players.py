@@ -111,10 +111,10 @@ class PlayedTerminal:
     def __init__(self) -> None:
         self.bytes: list[bytes] = []
         self.written = b""
-        self.tells = False
+        self.tells_releases = False
 
     def open(self) -> None:
-        pass
+        self.tells_releases = False
 
     def read(self, patience: float) -> bytes:
         return self.bytes.pop(0) if self.bytes else b""
@@ -123,7 +123,7 @@ class PlayedTerminal:
         self.written += data
 
     def tell_releases(self) -> None:
-        self.tells = True
+        self.tells_releases = True
 
     def close(self) -> None:
         pass

@@ -6,6 +6,7 @@ from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 
+import av
 import numpy as np
 import pyarrow.parquet as pq
 
@@ -47,6 +48,13 @@ def _frames(info, row, opened):
 
 def _is_clock(name):
     return name in (*CLOCKS, *EPISODE_CLOCKS) or name.startswith(tuple(f"stats/{clock}/" for clock in CLOCKS))
+
+
+def pictures(root):
+    """Return every picture of a dataset, decoded, camera by camera."""
+    for path in sorted(root.glob("videos/*/*/*.mp4")):
+        with av.open(str(path)) as video:
+            yield from (frame.to_ndarray(format="rgb24") for frame in video.decode(video=0))
 
 
 def saved(folder):

@@ -1,6 +1,7 @@
 // Asks before an episode is saved otherwise than the task's judge says, or lost with the end of the recording.
 // The robot stands still meanwhile, and STOP works as ever.
-const byId = (id) => document.getElementById(id);
+import { byId } from "./dom.js";
+
 const SAVES = ["success", "failure"];
 
 export class Decision {

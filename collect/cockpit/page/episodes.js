@@ -1,13 +1,9 @@
 // Episodes: start (after a countdown, for who wants it), how far they are, what was recorded.
+import { byId, set } from "./dom.js";
 import { playButton } from "./playback.js";
 import { keep, recall } from "./store.js";
 
-const byId = (id) => document.getElementById(id);
 const COUNTS = 3; // before the start [s]
-
-function set(id, words) {
-  if (byId(id).textContent !== words) byId(id).textContent = words;
-}
 
 const MANY = 1000; // episodes that there is room for: more are not counted
 

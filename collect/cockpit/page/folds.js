@@ -1,7 +1,7 @@
 // What can be put away: panels, which are away at first on a small screen, and sticks, where there is a mouse.
+import { byId } from "./dom.js";
 import { keep, recall } from "./store.js";
 
-const byId = (id) => document.getElementById(id);
 const SMALL = matchMedia("(max-height: 480px), (max-width: 760px)"); // as in style.css
 const isFlag = (value) => typeof value === "boolean";
 

@@ -1,9 +1,8 @@
 // The card of keys, buttons and sticks, drawn from the mapping in force; a click changes one.
+import { byId } from "./dom.js";
 import { buttonName } from "./gamepad.js";
 import { axisName, keyName } from "./keymap.js";
 import { STICK_AXES, STOP } from "./mapping.js";
-
-const byId = (id) => document.getElementById(id);
 
 function table(rows) {
   const made = document.createElement("dl");

@@ -29,12 +29,11 @@ export class Inputs {
     this.held = new Set();
     this.owned = new Set();
     const keyboard = { device: "keyboard", moves: () => this.keyed(), letGo: () => this.held.clear() };
-    this.sources = [keyboard]; // each {device, moves(), letGo(), targets where it has some}
+    this.sources = [keyboard]; // each {device, moves(), letGo(), targets where it has some, turns: whether its sticks turn the hand}
     this.mapping = null;
     this.device = "keyboard";
     this.grips = [false]; // which grippers shall be closed, one a hand
     this.parts = {}; // what parts of axes stand for, where there are several hands
-    this.turns = false; // whether sticks turn the hand
     this.bank = 0; // which of what they can move the sticks move
     this.hasFocus = document.hasFocus();
     this.listen();
@@ -114,7 +113,7 @@ export class Inputs {
   }
 
   bankOf() {
-    return sticksInForce(this.owned, this.turns || Boolean(this.gamepad?.turns), this.bank);
+    return sticksInForce(this.owned, this.sources.some(({ turns }) => turns), this.bank);
   }
 
   get isHere() {

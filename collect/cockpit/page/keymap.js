@@ -106,6 +106,9 @@ export function defaultKeys(stage) {
 
 export const BY_JOINTS = "base by its joints"; // owned: keys and sticks of the base mean its joints
 
+// Whether something is owned whose name begins so, such as "ee.".
+export const owns = (owned, start) => [...owned].some((name) => name.startsWith(start));
+
 const drives = (axis, owned) => owned.has(axis) || (axis.startsWith("base.") && owned.has(BY_JOINTS));
 
 const FIRST = [["one.", "two."], ["ee.", "apart."], [""]]; // of two on one key, the hand's; of both hands, each one's
@@ -125,7 +128,7 @@ export function inForce(entries, owned) {
 function banks(owned, turns) {
   const arm = [...owned].filter((name) => name.startsWith("joint.") && !name.includes("base"));
   const fours = arm.flatMap((_, index) => (index % 4 ? [] : [arm.slice(index, index + 4).map((axis, each) => [each, axis, 1])]));
-  const isHand = [...owned].some((name) => name.startsWith("ee.")), isBase = owned.has("base.vx") || owned.has(BY_JOINTS);
+  const isHand = owns(owned, "ee."), isBase = owned.has("base.vx") || owned.has(BY_JOINTS);
   if (owned.has("two.vx")) return [turns ? STICKS.hands_turn : STICKS.hands, ...fours];
   if (isHand) return [turns ? [...STICKS.turn, ...STICKS.apart, [3, "lone.v", -1]] : isBase ? STICKS.both : STICKS.hand, ...fours];
   return [...fours, ...(isBase || !arm.length ? [STICKS.base] : [])];

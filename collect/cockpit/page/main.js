@@ -1,5 +1,6 @@
 // Puts the page together: inputs up many times a second, the newest picture down.
 import { Decision } from "./decision.js";
+import { byId, set } from "./dom.js";
 import { driverWords } from "./drivers.js";
 import { Episodes } from "./episodes.js";
 import { Gamepad } from "./gamepad.js";
@@ -7,7 +8,7 @@ import { Help } from "./help.js";
 import { named, partsOf } from "./hands.js";
 import { Inputs } from "./inputs.js";
 import { Mapping } from "./mapping.js";
-import { BY_JOINTS, digitGroups, inForce, keyName } from "./keymap.js";
+import { BY_JOINTS, digitGroups, inForce, keyName, owns } from "./keymap.js";
 import { Link } from "./link.js";
 import { Masks } from "./masks.js";
 import { Notices } from "./notices.js";
@@ -21,7 +22,6 @@ import { XrHands } from "./xr.js";
 import { foldPanels } from "./folds.js";
 
 const PERIOD = 25; // between two messages [ms]
-const byId = (id) => document.getElementById(id);
 const view = new View(byId("view"), (hand) => ask("hand", hand));
 let stage = null, frame = null, told = null, drawn = null;
 let groups = [], group = 0, active = 0; // of the joints that digits mean; and the hand at that time
@@ -41,7 +41,7 @@ const act = (name) => DO[name]();
 const notices = new Notices();
 const decision = new Decision(ask, way);
 const inputs = new Inputs(act);
-const gamepad = inputs.gamepad = new Gamepad(inputs, act, (words) => notices.say(words));
+const gamepad = new Gamepad(inputs, act, (words) => notices.say(words));
 const touch = new TouchSticks(byId("sticks"), inputs, act);
 const sliders = new Sliders(byId("sliders"), (channel) => choose(groups.findIndex(({ channels }) => channels.includes(channel))));
 const link = new Link({
@@ -86,8 +86,7 @@ function otherFocus() {
 // The other hand; where joints are steered, the next ones that digits mean.
 function otherHand() {
   if (!frame || !(stage?.hands.length > 1)) return;
-  const owns = (part) => [...inputs.owned].some((name) => name.startsWith(part));
-  if (owns("joint.") && !owns("ee.")) choose((group + 1) % groups.length);
+  if (owns(inputs.owned, "joint.") && !owns(inputs.owned, "ee.")) choose((group + 1) % groups.length);
   else ask("hand", stage.hands[(frame.hand + 1) % stage.hands.length].name);
 }
 
@@ -131,12 +130,11 @@ document.addEventListener("click", (event) => { // the mouse leaves no focus beh
 });
 
 function bodiesOf(owned) {
-  const has = (prefix) => [...owned].some((name) => name.startsWith(prefix));
   const bodies = stage.shapes.bodies, lit = new Set();
-  if (has("base")) lit.add("planar_base"); // by its twist or its joints
+  if (owns(owned, "base")) lit.add("planar_base"); // by its twist or its joints
   for (const { name: hand } of stage.hands) {
     const prefix = hand && `${hand}.`;
-    if (!has(`${hand || "ee"}.`) && !(hand && has("pair."))) continue;
+    if (!owns(owned, `${hand || "ee"}.`) && !(hand && owns(owned, "pair."))) continue;
     for (const name of bodies) if (name === `${prefix}gripper` || name.startsWith(`${prefix}finger`)) lit.add(name);
   }
   for (const name of owned) if (name.startsWith("joint.")) lit.add(`${name.slice(6)}_body`);
@@ -170,7 +168,7 @@ function own() {
   if (before === Object.values(inputs.parts).join() && [...names].join() === [...inputs.owned].join()) return;
   inputs.owned = names;
   inputs.bank = 0;
-  inputs.turns = false;
+  touch.turns = false;
   if (!frame.drivers) view.light_up(bodiesOf(inputs.owned));
   help.draw();
   hint();
@@ -182,7 +180,7 @@ function sayDrivers() {
   byId("drivers").hidden = !frame.drivers;
   if (!frame.drivers) return;
   const said = driverWords(frame, masks.groups, stage, { start: keyName(inputs.mapping.actions.start ?? "") });
-  if (byId("drivers").textContent !== said) byId("drivers").textContent = said;
+  set("drivers", said);
   byId("drivers").classList.toggle("mine", frame.drivers.person.length > 0);
   const [mine, its] = ["person", "policy"].map((who) => bodiesOf(new Set(frame.drivers[who].map((index) => stage.channels[index]))));
   if ([...mine, "", ...its].join() !== [...view.owned, "", ...view.its].join()) view.light_up(mine, its);
@@ -216,7 +214,7 @@ function say() {
   if (!stage || !view.isReady) return;
   if (frame && frame !== told) tell();
   const input = inputs.read(stage.channels);
-  if (byId("pad").textContent !== gamepad.says) byId("pad").textContent = gamepad.says;
+  set("pad", gamepad.says);
   if (panels.you.driving) link.drive({ ...input, view: view.azimuth });
 }
 

@@ -1,16 +1,13 @@
 // Any mask: which parts the person owns, by group, joint or single channel; choosing a mode goes back.
+import { button, byId, follow, write } from "./dom.js";
 import { driverOf } from "./drivers.js";
 import { jointName, shortName, wordsOf } from "./keymap.js";
 
 const OF_PAIR = ["pair", "apart"];
-const byId = (id) => document.getElementById(id);
 
 function toggle(words, label, act) {
-  const made = document.createElement("button");
-  made.type = "button";
-  made.textContent = words;
+  const made = button(words, act);
   made.setAttribute("aria-label", label);
-  made.addEventListener("click", act);
   return made;
 }
 
@@ -65,11 +62,11 @@ export class Masks {
       const count = channels.filter((each) => this.mine.has(each)).length;
       const [mark, who, pressed] = count === channels.length ? ["●", "you", "true"] : count ? ["◐", "some", "mixed"] : ["○", "robot", "false"];
       const words = (frame.drivers && frame.phase === "driving" ? driverOf(frame.drivers, channels) : [mark, who]).join(` ${name}: `);
-      if (this.parts[index].textContent !== words) this.parts[index].textContent = words;
+      write(this.parts[index], words);
       this.parts[index].setAttribute("aria-pressed", pressed);
     });
     this.single.forEach((button, index) => button.setAttribute("aria-pressed", String(this.mine.has(index))));
     const alone = this.mine.size === 1 && this.joints.includes([...this.mine][0]) ? String([...this.mine][0]) : "";
-    if (document.activeElement !== byId("one-joint")) byId("one-joint").value = alone;
+    follow("one-joint", alone);
   }
 }

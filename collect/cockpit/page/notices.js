@@ -1,9 +1,9 @@
 // What is said for a while: what went wrong, and three sentences for who is here for the first time.
+import { byId } from "./dom.js";
 import { keyName, shortName } from "./keymap.js";
 import { keep, recall } from "./store.js";
 
 const SHOWN = 7000; // [ms]
-const byId = (id) => document.getElementById(id);
 
 // "W S forward, A D sideways": both keys of each axis.
 function pairs(keys) {

@@ -1,26 +1,14 @@
 // Words and buttons: what the page says besides the picture. Everything comes from the newest frame.
+import { button, byId, follow, set } from "./dom.js";
 import { jointName } from "./keymap.js";
 import { stateOf } from "./states.js";
 import { centimetres } from "./way.js";
 
-const byId = (id) => document.getElementById(id);
 const STARTS = { ready: "Start", paused: "Go on", stopped: "Release" };
 const NEEDS = {
   begun: ["pause", "undo", "success", "failure"], driver: ["restart", "discard", "quit"],
   choices: ["mode", "frame", "speed", "one-joint"],
 };
-
-function set(id, text) {
-  const element = byId(id);
-  if (element.textContent !== text) element.textContent = text;
-}
-
-function button(text, act) {
-  const made = document.createElement("button");
-  made.textContent = text;
-  made.addEventListener("click", act);
-  return made;
-}
 
 export class Panels {
   constructor(link) {
@@ -143,13 +131,13 @@ export class Panels {
 
   choices(frame) {
     const mode = this.modes[frame.mode];
-    if (document.activeElement !== byId("mode")) byId("mode").value = mode ? frame.mode : "";
+    follow("mode", mode ? frame.mode : "");
     set("mode-help", mode?.help ?? "Your own mask: you steer what is lit, the robot the rest. Choose a mode to go back.");
     byId("focus").hidden = !frame.focus;
     this.hands.forEach((each, index) => each.setAttribute("aria-pressed", String(index === frame.hand)));
     for (const each of document.querySelectorAll("[data-focus]")) each.setAttribute("aria-pressed", String(each.dataset.focus === frame.focus));
-    if (document.activeElement !== byId("frame")) byId("frame").value = frame.frame;
-    if (document.activeElement !== byId("speed")) byId("speed").value = frame.speed;
+    follow("frame", frame.frame);
+    follow("speed", frame.speed);
     set("speed-said", `${Math.round(100 * frame.speed)} %`);
     byId("practice").checked = frame.practice;
     for (const box of byId("locks").querySelectorAll("input")) box.checked = frame.locked.includes(Number(box.dataset.joint));

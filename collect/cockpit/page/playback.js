@@ -1,19 +1,18 @@
 // Plays a recorded episode again, in place of the live picture: a bar to go through it, play, pause, close.
+import { button } from "./dom.js";
 import { makeBodies } from "./scene.js";
 
 const WIDTH = 7; // numbers a body
 
 // Returns a button that plays an episode of the list.
 export function playButton(episode, number) {
-  const button = document.createElement("button");
-  button.className = "play";
-  button.textContent = "▶ play";
-  button.setAttribute("aria-label", `play episode ${number} again`);
-  button.addEventListener("click", () => {
-    button.blur();
+  const made = button("▶ play", () => {
+    made.blur();
     document.dispatchEvent(new CustomEvent("play-episode", { detail: { ...episode, number } }));
   });
-  return button;
+  made.className = "play";
+  made.setAttribute("aria-label", `play episode ${number} again`);
+  return made;
 }
 
 // A file: the length of a JSON header, the header, then rows of numbers: the time, and where each body is.

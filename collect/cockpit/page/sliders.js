@@ -1,15 +1,15 @@
 // Sliders as a leader arm: while one is held, the arm's joints go where the sliders are.
 // A slider that was let go stands where the arm is, and moves from there: nothing jumps.
-import { jointName } from "./keymap.js";
+import { ENDS } from "./dom.js";
+import { jointName, owns } from "./keymap.js";
 
-const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
 const STEP = 0.03; // of an arrow key [rad]
 const ARROWS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
 
 export class Sliders {
   // choose(channel): a joint's name or bar was clicked
   constructor(box, choose) {
-    Object.assign(this, { box, choose, device: "sliders", held: new Map(), targets: [], q: [], rows: [] });
+    Object.assign(this, { box, choose, device: "sliders", held: new Set(), targets: [], q: [], rows: [] });
   }
 
   stage(stage) {
@@ -62,7 +62,7 @@ export class Sliders {
   // The first one that is held: all joints stay where the arm is now.
   hold(index) {
     if (!this.held.size) this.targets = this.q.slice(this.base);
-    this.held.set(index, true);
+    this.held.add(index);
   }
 
   put(index, value) {
@@ -95,7 +95,7 @@ export class Sliders {
   // Show where the arm is; sliders are there only where the arm's joints are steered.
   frame(frame, owned) {
     this.q = frame.q;
-    const isShown = frame.mode !== "direct_single" && this.rows.some(({ channel }) => owned.has(channel)) && ![...owned].some((name) => name.startsWith("ee."));
+    const isShown = frame.mode !== "direct_single" && this.rows.some(({ channel }) => owned.has(channel)) && !owns(owned, "ee.");
     if (!isShown) this.letGo();
     this.box.closest("[data-sliders]").hidden = !isShown;
     if (!isShown) return;

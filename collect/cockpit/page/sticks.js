@@ -1,12 +1,11 @@
 // Two sticks for thumbs, or the mouse: where a finger is on them, they are. Each finger has its own.
+import { ENDS, write } from "./dom.js";
 import { shaped } from "./inputs.js";
-import { shortName } from "./keymap.js";
-
-const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
+import { owns, shortName } from "./keymap.js";
 
 export class TouchSticks {
   constructor(box, inputs, act) {
-    Object.assign(this, { box, inputs, device: "touch", lift: 0, held: {}, deflected: { left: [0, 0], right: [0, 0] } });
+    Object.assign(this, { box, inputs, device: "touch", turns: false, lift: 0, held: {}, deflected: { left: [0, 0], right: [0, 0] } });
     this.knobs = [...box.querySelectorAll(".stick")];
     for (const stick of this.knobs) this.stick(stick);
     for (const lever of box.querySelectorAll("[data-lever]")) this.lever(lever, act);
@@ -42,9 +41,9 @@ export class TouchSticks {
 
   // The other thing that the sticks can do: turn the hand, or move the next joints.
   turn(lever) {
-    if ([...this.inputs.owned].some((name) => name.startsWith("ee."))) this.inputs.turns = !this.inputs.turns;
+    if (owns(this.inputs.owned, "ee.")) this.turns = !this.turns;
     else this.inputs.nextBank();
-    lever.setAttribute("aria-pressed", String(this.inputs.turns));
+    lever.setAttribute("aria-pressed", String(this.turns));
   }
 
   letGo() {
@@ -68,8 +67,7 @@ export class TouchSticks {
       const part = sticks.find(([each]) => each >> 1 === index)?.[1] ?? "";
       const [what] = this.inputs.channelOf(part).split(".");
       const words = `${{ joint: "joints", ee: "hand", pair: "both hands", "": "joints" }[what] ?? what}: ${said(2 * index)}`;
-      const label = stick.querySelector("span");
-      if (label.textContent !== words) label.textContent = words;
+      write(stick.querySelector("span"), words);
     });
     for (const name of ["up", "down"]) this.box.querySelector(`[data-lever=${name}]`).hidden = !this.inputs.owned.has("ee.vz");
   }

@@ -1,5 +1,6 @@
 // Cards of a user study: what a participant reads and answers, above everything else; a strip while they drive.
 // An answer is sent until the card comes back with it: then it is on the disk.
+import { addStyle, button, byId } from "./dom.js";
 import { drawItem } from "./form.js";
 import { axisName, keyName } from "./keymap.js";
 
@@ -29,9 +30,7 @@ export class Study {
   }
 
   build() {
-    const style = document.createElement("link");
-    Object.assign(style, { rel: "stylesheet", href: "study.css" });
-    document.head.append(style);
+    addStyle("study.css");
     this.box = make("section", "study");
     this.box.hidden = true;
     this.box.setAttribute("role", "dialog");
@@ -48,7 +47,7 @@ export class Study {
   // What the study does not let a participant do is not there.
   stage(stage) {
     for (const [ask, id] of Object.entries(CONTROLS)) {
-      const control = document.getElementById(id);
+      const control = byId(id);
       const whole = control?.closest("label") ?? control;
       if (whole && stage.refuses.includes(ask)) whole.style.display = "none";
     }
@@ -79,7 +78,7 @@ export class Study {
     this.box.hidden = hide;
     this.strip.hidden = isCard || !this.card;
     if (this.card && !isCard) this.strip.textContent = [this.card.strip, this.card.note].filter(Boolean).join(" · ");
-    if (isCard) document.getElementById("phase").textContent = "questions";
+    if (isCard) byId("phase").textContent = "questions";
   }
 
   draw() {
@@ -105,17 +104,9 @@ export class Study {
 
   buttons(card) {
     const row = make("div", "study-buttons");
-    this.next = make("button", "study-next", card.items.length ? "Next" : "Go on");
-    this.next.type = "button";
-    this.next.className = "main";
-    this.next.addEventListener("click", () => this.answer(NEXT, true));
-    row.append(this.next);
-    if (card.pause) {
-      const pause = make("button", "study-pause", "Pause: go on another time");
-      pause.type = "button";
-      pause.addEventListener("click", () => this.answer(PAUSE, true));
-      row.append(pause);
-    }
+    this.next = button(card.items.length ? "Next" : "Go on", () => this.answer(NEXT, true));
+    row.append(Object.assign(this.next, { id: "study-next", className: "main" }));
+    if (card.pause) row.append(Object.assign(button("Pause: go on another time", () => this.answer(PAUSE, true)), { id: "study-pause" }));
     return row;
   }
 

@@ -1,5 +1,6 @@
 // What lies over the picture: the choice of cameras, what the marks mean, the bar of playback, the nearest distance.
 import { CAMERAS } from "./cameras.js";
+import { addStyle, byId } from "./dom.js";
 import { keep, recall } from "./store.js";
 
 const LEGEND = [ // class of the sample, words
@@ -52,7 +53,7 @@ function playbackBar(parent) {
 
 // What is left of the picture between the panels, and above and below what lies on it, {x, y, width, height} [px].
 export function free(box) {
-  const area = box.getBoundingClientRect(), over = [...box.children, ...OVER.map((id) => document.getElementById(id))];
+  const area = box.getBoundingClientRect(), over = [...box.children, ...OVER.map(byId)];
   const edges = over.map((each) => each.getBoundingClientRect()).filter(({ height, right }) => height && right > area.left);
   const middle = area.top + area.height / 2;
   const top = Math.max(area.top, ...edges.filter((each) => each.bottom < middle).map((each) => each.bottom));
@@ -62,14 +63,12 @@ export function free(box) {
 
 // choose(name): a camera was chosen
 export function build(canvas, choose) {
-  const style = document.createElement("link");
-  Object.assign(style, { rel: "stylesheet", href: "view.css" });
-  document.head.append(style);
+  addStyle("view.css");
   const box = make("div", "view-tools"), label = make("output", "nearest-label");
   canvas.after(label, box); // below whatever else lies over the picture
   label.hidden = true;
   const camera = cameraChoice(box, choose);
   legend(box);
   const playback = playbackBar(box);
-  return { camera, playback, label, free: () => free(box), over: [box, ...box.children, ...OVER.map((id) => document.getElementById(id))] };
+  return { camera, playback, label, free: () => free(box), over: [box, ...box.children, ...OVER.map(byId)] };
 }

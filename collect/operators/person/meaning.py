@@ -7,8 +7,7 @@ import numpy as np
 
 from handrail.collect.operators.modes import MASK, Focus, TeleopMode
 from handrail.collect.operators.person.inputs import Input
-from handrail.collect.operators.scripted.input_map import StickMap
-from handrail.collect.operators.scripted.steering import FOLLOW, Gains
+from handrail.collect.operators.scripted.steering import FOLLOW, Gains, full_stick
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
@@ -49,14 +48,13 @@ class InputMeaning:
 
     Args:
         model: of the robot.
-        mode: any of the modes.
 
     Attributes:
         channels: of the robot.
         hands: names of its hands.
     """
 
-    def __init__(self, model: RobotModel, mode: TeleopMode) -> None:
+    def __init__(self, model: RobotModel) -> None:
         self.channels = Channels.of(model.description)
         self.hands = tuple(hand.name for hand in model.description.hands)
         pair, count = self.channels.pair_slice.start, len(self.hands)
@@ -65,7 +63,7 @@ class InputMeaning:
         self._apart = slice(pair + 6, self.channels.pair_slice.stop)
         self._base = len(self.channels.base)
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
-        self._full = StickMap(model, mode, Gains().within(model.description.world)).full
+        self._full = full_stick(self.channels, Gains().within(model.description.world))
 
     def fits(self, inputs: Input) -> bool:
         """Whether inputs are those of this robot."""

@@ -66,7 +66,7 @@ class Person:
         supervises: bool = False,
     ) -> None:
         self._lost = Phase.PAUSED if supervises else Phase.LOST
-        self.meaning = InputMeaning(model, modes[first])
+        self.meaning = InputMeaning(model)
         self.modes, self._clock = modes, clock
         self.setting, self.phase = Setting(modes[first], hand=model.hand.name), Phase.READY
         self.inputs: Input | None = None

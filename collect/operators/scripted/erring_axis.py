@@ -12,9 +12,7 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.controller import State
 
 _A_BIT = 0.15  # to choose among n, for each bit log₂(n + 1): Card, Moran and Newell 1983, 0 to 0.157 [s]
-_WRONG_AXIS = (
-    0.003  # probability of a wrong control among similar ones: Swain, Guttmann 1983, table 20-12 (2)
-)
+_WRONG_AXIS = 0.003  # probability of a wrong one of similar controls: Swain, Guttmann 1983, table 20-12 (2)
 _WRONG_WAY = 0.05  # of turning a control against what one expects: there (6)
 _GUESS = 0.5  # the same under stress, a guess: there (7); here of a joint's first push in an episode
 

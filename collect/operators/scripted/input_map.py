@@ -13,6 +13,7 @@ from handrail.collect.operators.scripted.steering import (
     Gains,
     MotionGoal,
     Target,
+    full_stick,
     hand_errors,
     hand_twist,
 )
@@ -104,11 +105,9 @@ class InputMap(ABC):
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
         moved = np.sum([self.channels.moving(hand) for hand in range(len(self.channels.hands))], axis=0)
         self._used = (moved < 2) | (np.arange(model.size) < self._base)  # a torso is slow: it is left alone
-        hand, base = gains.full[:6], gains.full[6:][: self._base]
-        joints = np.concatenate([base, np.full(model.size - self._base, gains.joint_rate)])
-        twists = [hand] * len(self.channels.hands) + ([hand, hand[:1]] if self.channels.pair else [])
-        self.full: FloatArray = np.concatenate([base, *twists, joints])
-        self.fine: FloatArray = np.concatenate([base, *twists, as_fine(model, joints, hand) * joints])
+        self.full, joints = full_stick(self.channels, gains), self.channels.joint_slice
+        self.fine = self.full.copy()
+        self.fine[joints] *= as_fine(model, self.full[joints], gains.full[:6])
 
     @abstractmethod
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:

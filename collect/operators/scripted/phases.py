@@ -98,10 +98,10 @@ class PhasedScript(ABC):
         other = phase.gripper * bool(phase.apart) if other is None else other
         grippers = tuple(phase.gripper if hand == going else other for hand in hands)
         if self._reached_at is not None:
-            return replace(MotionGoal.rest(phase.focus, phase.gripper), grippers=grippers)
+            return MotionGoal.rest(phase.focus, grippers)
         hand = hand_twist(phase.steered(view.task), phase.hand, self._gains, phase.pace)
         base = base_twist(view.state.q, phase.base, self._gains)
-        return MotionGoal(hand, base, phase.focus, phase.gripper, phase, grippers)
+        return MotionGoal(hand, base, phase.focus, phase, grippers)
 
     def _advance(self, view: View) -> None:
         phase, time = self._phases[0], view.state.time

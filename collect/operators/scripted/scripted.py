@@ -120,8 +120,7 @@ class ScriptedOperator:
         moved = np.where(mask, moved, 0.0)
         values = np.where(mask, self._map.sent(moved, view.state), 0.0)
         raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
-        hands = range(len(self._map.channels.hands))
-        grippers = goal.grippers or tuple(goal.gripper if hand == view.task.hand else 0.0 for hand in hands)
+        grippers = goal.grippers or (0.0,) * len(self._map.channels.hands)
         return Intent(values, mask, grippers, self._mode.name, time, raw=raw)
 
     def _switch(self, mask: BoolArray, time: float) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from handrail.collect.operators.modes import Focus
 from handrail.collect.world.task import TaskState
 from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.numerics.rotation import rotation_vector, turned
 from handrail.controllers.robot.model import Pose
 from handrail.controllers.robot.parts import WorldScale
@@ -63,14 +64,13 @@ class MotionGoal:
     hand: FloatArray  # twist of the tool, world-aligned, (6,) [m/s, rad/s]
     base: FloatArray  # twist of the base in the base frame, (3,)
     focus: Focus = "hand"  # which of the two matters now
-    gripper: float = 0.0  # 0 open, 1 closed
     target: Target | None = None  # where that leads; None wants to rest
-    grippers: tuple[float, ...] = ()  # of each hand, where a task is of several; then `gripper` means nothing
+    grippers: tuple[float, ...] = ()  # of each hand, 0 open, 1 closed; all open where nothing is said
 
     @classmethod
-    def rest(cls, focus: Focus = "hand", gripper: float = 0.0) -> "MotionGoal":
+    def rest(cls, focus: Focus = "hand", grippers: tuple[float, ...] = ()) -> "MotionGoal":
         """Return the goal that nothing moves."""
-        return cls(np.zeros(6), np.zeros(3), focus, gripper)
+        return cls(np.zeros(6), np.zeros(3), focus, grippers=grippers)
 
 
 @dataclass(frozen=True)
@@ -101,6 +101,14 @@ class Gains:
         """Full deflection of hand twist and base twist, (9,)."""
         hand = [self.hand_speed] * 3 + [self.hand_rate] * 3
         return np.array([*hand, self.base_speed, self.base_speed, self.base_rate])
+
+
+def full_stick(channels: Channels, gains: Gains) -> FloatArray:
+    """Return full deflection of the input on each channel, (m,) [m/s, rad/s]."""
+    hand, base = gains.full[:6], gains.full[6:][: len(channels.base)]
+    twists = [hand] * len(channels.hands) + ([hand, hand[:1]] if channels.pair else [])
+    arm = np.full(len(channels.joints) - len(base), gains.joint_rate)
+    return np.concatenate([base, *twists, base, arm])
 
 
 def length(vector: FloatArray) -> float:

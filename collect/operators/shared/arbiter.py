@@ -57,12 +57,12 @@ class Groups:
 
     @cached_property
     def masks(self) -> dict[str, BoolArray]:
-        """Each group's channels, (m,), by its name."""
-        channels, first = self.channels, len(self.channels.base)
-        named = {"base": channels.mask("base")} if first else {}
-        named |= {self.hand(n): _sliced(channels, channels.hand_slice(n)) for n in range(len(channels.hands))}
-        named |= {"pair": channels.mask("pair", "apart")} if channels.pair else {}
-        return named | {name: channels.mask(name) for name in channels.joints}
+        """Each group's channels, (m,), by its name; none of a base or a pair that there is not."""
+        channels = self.channels
+        hands = {self.hand(number): names for number, names in enumerate(channels.hands)}
+        groups = {"base": channels.base, **hands, "pair": channels.pair}
+        groups |= {name: (name,) for name in channels.joints}
+        return {name: channels.mask(*names) for name, names in groups.items()}
 
     def hand(self, number: int) -> str:
         """Return the name of a hand's group."""
@@ -83,34 +83,25 @@ class Groups:
         arm alone; with all of these joints goes the hand. What moves a hand from afar (base, torso) stays:
         the MPC lets the arm make up for it.
         """
-        lost, arms = owned.copy(), [self._arm(hand) for hand in range(len(self.channels.hands))]
-        base = self.channels.mask("base") if self.channels.base else np.zeros_like(owned)
-        joints = np.zeros_like(owned)
-        joints[self.channels.joint_slice.start :][: len(self.channels.base)] = True
-        if np.any(owned & (base | joints)):
-            lost |= base | joints
-        pair = self.masks.get("pair", np.zeros_like(owned))
-        for hand, arm in enumerate(arms):
-            twist = self.masks[self.hand(hand)]
+        lost, pair = owned.copy(), self.masks["pair"]
+        base = self.masks["base"] | self.channels.mask(*self.channels.joints[: len(self.channels.base)])
+        if np.any(owned & base):
+            lost |= base
+        for hand in range(len(self.channels.hands)):
+            twist, arm = self.masks[self.hand(hand)], self._arm(hand)
             if np.any(owned & (twist | pair)) or np.all(owned[arm]):
                 lost |= twist | arm | pair
         return lost
 
     def grippers(self, owned: BoolArray) -> tuple[bool, ...]:
         """Return of which grippers an owner of channels has the hand, its pair, or a joint of its arm."""
-        pair = self.masks.get("pair", np.zeros_like(owned))
+        pair = self.masks["pair"]
         arms = (self.masks[self.hand(n)] | self._arm(n) | pair for n in range(len(self.channels.hands)))
         return tuple(bool(np.any(owned & arm)) for arm in arms)
 
     def _arm(self, hand: int) -> BoolArray:
         alone = len(self.channels.hands) == 1
         return self.channels.mask("arm" if alone else f"{self.hand(hand)}.arm")
-
-
-def _sliced(channels: Channels, where: slice) -> BoolArray:
-    mask = np.zeros(channels.size, dtype=bool)
-    mask[where] = True
-    return mask
 
 
 class Lately:

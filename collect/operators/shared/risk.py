@@ -1,11 +1,12 @@
 """The policy asks for help: while it is unsure it drives nothing."""
 
-from handrail.collect.operators.shared.arbiter import Lately, Shares, Wishes
+from handrail.collect.operators.shared.arbiter import Shares, Wishes
+from handrail.collect.operators.shared.by_input import ByMask
 
 _CALM = 0.5  # of the doubt that asks for help: below it the policy drives again
 
 
-class Risk(Lately):
+class Risk(ByMask):
     """As `ByMask`; but while the policy is unsure, it has nothing: `doubt > δ`, until `doubt ≤ δ / 2`.
 
     If the person moves nothing then, nobody drives, and the robot brakes and waits for them. A doubt that is
@@ -21,7 +22,6 @@ class Risk(Lately):
 
     def shares(self, wishes: Wishes) -> Shares:
         """Return 1 where a source is the owner, 0 elsewhere."""
-        owned = self.owned(wishes)
+        person, policy = super().shares(wishes)
         self._asks = not wishes.doubt <= self._settings.doubt * (_CALM if self._asks else 1.0)
-        free = ~self._groups.taken(owned) & (not self._asks)
-        return Shares(owned.astype(float), free.astype(float))
+        return Shares(person, policy * (not self._asks))

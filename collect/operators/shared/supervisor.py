@@ -1,6 +1,6 @@
 """A scripted supervisor: watches a policy as a person would, and takes over when it gets no further."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,33 +14,27 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.robot.model import RobotModel
 
-
-@dataclass(frozen=True)
-class Vigilance:
-    """When a supervisor takes over, and when they let go."""
-
-    patience: float = 3.0  # without progress [s]
-    progress: float = 0.02  # what counts as some: so much nearer to the next thing to do [m]
-    stray: float = 0.10  # further away from it than before is enough at once [m]
-    decision: float = 0.7  # from there until their hand is on the stick [s]
-    shortest: float = 1.0  # help [s]
-    turn: float = 0.3  # what weighs as much as a radian [m]
+_PATIENCE = 3.0  # without progress [s]
+_PROGRESS = 0.02  # what counts as some: so much nearer to the next thing to do [m]
+_STRAY = 0.10  # further away from it than before is enough at once [m]
+_DECISION = 0.7  # from there until their hand is on the stick [s]
+_SHORTEST = 1.0  # help [s]
+_TURN = 0.3  # what weighs as much as a radian [m]
 
 
 class PolicySupervisor:
     """Knows what is to be done next; helps when the hand comes no nearer to it; an operator.
 
-    With e the distance to the script's next target, it helps a moment after e has not fallen by `progress`
-    for `patience`, or has risen by `stray`; and lets go when that target is reached, for the next one.
+    With e the distance to the script's next target, it helps a moment after e has not fallen by 2 cm · scale
+    for 3 s, or has risen by 10 cm · scale; and lets go when that target is reached, for the next one.
 
     Args:
         helper: what the person does where they steer.
-        vigilance: their patience.
         scale: of the robot's world.
     """
 
-    def __init__(self, helper: ScriptedOperator, vigilance: Vigilance, scale: float) -> None:
-        self._helper, self._vigilance, self._scale = helper, vigilance, scale
+    def __init__(self, helper: ScriptedOperator, scale: float) -> None:
+        self._helper, self._scale = helper, scale
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the policy drives."""
@@ -53,13 +47,13 @@ class PolicySupervisor:
         """Return what they steer now; nothing moves while they watch."""
         time, intent = view.state.time, self._helper.act(view)
         reached = self._note(view)
-        if time >= self._takes + self._vigilance.shortest and reached:
+        if time >= self._takes + _SHORTEST and reached:
             self._takes = np.inf
         if time >= self._takes:
             return intent
-        late = time - self._since > self._vigilance.patience
+        late = time - self._since > _PATIENCE
         if self._takes == np.inf and (late or self._strays):
-            self._takes = time + self._vigilance.decision
+            self._takes = time + _DECISION
         return replace(intent, values=np.zeros_like(intent.values), raw=RawInput())
 
     def _note(self, view: View) -> bool:
@@ -68,22 +62,21 @@ class PolicySupervisor:
         identity = target.identity if target else b""
         another = identity != self._watches
         error = self._error(target, view)
-        if another or error < self._nearest - self._scale * self._vigilance.progress:
+        if another or error < self._nearest - self._scale * _PROGRESS:
             self._watches, self._nearest, self._since = identity, error, time
-        self._strays = error > self._nearest + self._scale * self._vigilance.stray
+        self._strays = error > self._nearest + self._scale * _STRAY
         return another
 
     def _error(self, target: Target | None, view: View) -> float:
         if target is None:
             return 0.0
         distance, angle = pose_errors(target.steered(view.task), target.hand)
-        return float(distance + self._scale * self._vigilance.turn * angle)
+        return float(distance + self._scale * _TURN * angle)
 
 
 def supervisor(model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings) -> PolicySupervisor:
     """Return who supervises a policy that does a task, and helps in a mode."""
-    helper = scripted_operator(model, mode, task, human)
-    return PolicySupervisor(helper, Vigilance(), model.description.world.scale)
+    return PolicySupervisor(scripted_operator(model, mode, task, human), model.description.world.scale)
 
 
 def hand_supervisor(

@@ -40,8 +40,6 @@ class CarryBox(Task):
 
     description: str = "Carry the box to the other table with both hands."
     horizon: float = 90.0  # time limit [s]
-    clearance: float = 0.15
-    """Between the robot's start and anything on the floor, and between obstacles [m]."""
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -60,7 +58,7 @@ class CarryBox(Task):
         x, y = on.front + rng.uniform(0.16, 0.20), on.position[1] + rng.uniform(-0.1, 0.1)
         thing = crate("box", x, y, on.top, yaw, SIZE, _MASS)
         q = _sample_start(model, rng)
-        return Start(Scene((*tables, thing, *sample_obstacles(model, q, rng, self.clearance)), _VIEW), q)
+        return Start(Scene((*tables, thing, *sample_obstacles(model, q, rng)), _VIEW), q)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (25,)."""

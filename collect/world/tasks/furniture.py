@@ -26,6 +26,7 @@ _TRAY: Colour = (0.30, 0.55, 0.42, 1.0)
 BAR = 0.03  # width and height of a handle [m]
 BAR_LENGTH = 0.11  # of the handle at a side [m]
 SIDES = (-1.0, 1.0)
+CLEARANCE = 0.15  # of the robot's start and obstacles on the floor from each other, at scale 1 [m]
 _MOST_OBSTACLES = 3
 _PREFIX = "obstacle"
 _QUANTITIES = ("x", "y", "radius", "height")
@@ -171,16 +172,13 @@ def floor_obstacles(scene: Scene) -> tuple[SceneObject, ...]:
     return tuple(item for item in scene.objects if item.name.startswith(_PREFIX))
 
 
-def sample_obstacles(
-    model: RobotModel, q: FloatArray, rng: np.random.Generator, clearance: float
-) -> list[SceneObject]:
+def sample_obstacles(model: RobotModel, q: FloatArray, rng: np.random.Generator) -> list[SceneObject]:
     """Draw two or three obstacles; reject those that overlap another or come close to the robot's start.
 
     Args:
         model: of the robot.
         q: where it starts, (n,).
         rng: drawn from.
-        clearance: between the robot's start and an obstacle, and between obstacles, at scale 1 [m].
     """
     wanted = int(rng.integers(2, _MOST_OBSTACLES + 1))
     start, scale = model.pose(q, "planar_base").position[:2], model.description.world.scale
@@ -191,12 +189,12 @@ def sample_obstacles(
             return placed
         item = _sample_obstacle(f"{_PREFIX}_{len(placed)}", scale, rng)
         at, size = item.position[:2], footprint(item)
-        if all(np.linalg.norm(at - centre) > radius + size + clearance * scale for centre, radius in circles):
+        if all(np.linalg.norm(at - centre) > radius + size + CLEARANCE * scale for centre, radius in circles):
             placed.append(item)
             circles.append((at, size))
     raise HandrailError(
         f"scene: no room for {wanted} obstacles around robot {model.description.name}, "
-        f"which starts at {start.round(2).tolist()}, with {clearance} m between them"
+        f"which starts at {start.round(2).tolist()}, with {CLEARANCE} m between them"
     )
 
 

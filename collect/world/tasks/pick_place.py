@@ -7,6 +7,7 @@ import numpy as np
 from handrail.collect.world.observation import names_of, pose_names, pose_numbers
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.world.task import (
+    OPEN,
     Aim,
     Start,
     Task,
@@ -31,13 +32,8 @@ from handrail.controllers.robot.parts import WorldScale
 _MASS = 0.1  # of a cube of 5 cm [kg]
 _SLIM = 0.7  # width of a bar, which two hands have to find, over a cube's
 _BIN_HEIGHT = 0.10
-_AT, _AROUND, _LIFTED = (
-    2.0,
-    1.0,
-    0.5,
-)  # of the cube's width: the hand is there, around it; it is off the table
+_AT, _AROUND, _LIFTED = 2.0, 1.0, 0.5  # of the cube's width: hand there, around it; it is off the table
 _ABOVE = 0.05  # the rim is let go, at scale 1 [m]
-_OPEN = 0.8  # share of the stroke from which the gripper is open
 _VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
 
@@ -51,8 +47,6 @@ class PickPlace(Task):
 
     description: str = "Pick up the cube and put it into the bin on the other table."
     horizon: float = 90.0  # time limit [s]
-    clearance: float = 0.15
-    """Between the robot's start and anything on the floor, and between obstacles, at scale 1 [m]."""
     length: float = 0.0
     """Of the cube along its y, where it is a bar; the bin is larger by half of that [m]."""
     stages = ("approach", "grasp", "lift", "carry", "place")
@@ -72,7 +66,7 @@ class PickPlace(Task):
             _sample_cube(tables[0], world, rng, self.length),
             _sample_bin(tables[1], world, rng, self.length),
         )
-        objects = (*tables, *things, *sample_obstacles(model, q, rng, self.clearance))
+        objects = (*tables, *things, *sample_obstacles(model, q, rng))
         return Start(Scene(objects, _VIEW.scaled(world.scale)), q)
 
     def features(self, state: TaskState) -> FloatArray:
@@ -92,7 +86,7 @@ class PickPlace(Task):
             return "carry"
         if away > _AT * width:
             return "approach"
-        return "lift" if away < _AROUND * width and state.opening < _OPEN else "grasp"
+        return "lift" if away < _AROUND * width and state.opening < OPEN else "grasp"
 
     def aim(self, state: TaskState) -> Aim:
         """Return the cube, from above; once it is in hand, the place above the bin to let it go."""

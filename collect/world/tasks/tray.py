@@ -37,10 +37,7 @@ from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 
 _HIGH = 0.20  # of the handle above the plate [m]
-_SIZES = (
-    (0.26, 0.32, _HIGH),
-    (0.26, 0.56, _HIGH),
-)  # of a tray for one hand, and for two: length, width, handle [m]
+_SIZES = (0.26, 0.32, _HIGH), (0.26, 0.56, _HIGH)  # of a tray for a hand, for two: length, width, handle [m]
 _TABLES = 0.7, 0.9  # width of the table for either [m]
 _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
 _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
@@ -62,8 +59,6 @@ class Tray(Task):
 
     description: str = "Carry the tray to the table and put it down without spilling the can."
     horizon: float = 90.0  # time limit [s]
-    clearance: float = 0.15
-    """Between the robot's start and anything on the floor, and between obstacles [m]."""
     hands: int = 1  # that hold it
 
     @property
@@ -78,7 +73,7 @@ class Tray(Task):
         x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
         goal = table("table", x, y, (0.6, _TABLES[self.hands - 1], rng.uniform(0.55, 0.65)))
         q, held = _sample_start(model, side, rng, self.hands)
-        objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
+        objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng))
         return Start(Scene(objects, _VIEW), q, grip=(BAR,) * self.hands)
 
     def features(self, state: TaskState) -> FloatArray:

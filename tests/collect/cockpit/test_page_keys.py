@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from handrail.collect.cockpit.pipe import Kind
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.model import load_model
 
@@ -119,7 +118,7 @@ def test_keys_are_called_as_the_keyboard_calls_them(on_bench):
 
 def test_a_question_is_answered_by_arrow_keys(on_bench):
     made, driver = on_bench()
-    made.server.pipe.send_surely(Kind.CARD, CARD | {"items": [ITEM]})
+    made.card = CARD | {"items": [ITEM]}
     radios = driver.page.locator("#study input[type=radio]")
     radios.nth(1).focus()
     driver.press("ArrowRight")
@@ -147,7 +146,7 @@ def test_a_card_says_the_keys_of_what_is_owned_as_they_are_now(on_bench, robot, 
     driver.page.get_by_role("button", name="failed: ↓").click()
     driver.press("F9")
     driver.press("KeyH")
-    made.server.pipe.send_surely(Kind.CARD, CARD | {"keys": channels(robot, *groups)})
+    made.card = CARD | {"keys": channels(robot, *groups)}
     table = driver.page.locator("#study-keys")
     for row in (*rows, "F9 failed", "Enter start, pause, go on", "Space STOP"):
         expect(table).to_contain_text(row.replace(" ", "", 1))

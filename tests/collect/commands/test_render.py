@@ -1,12 +1,11 @@
 """Pictures that are drawn afterwards are those that recording would have taken, and nothing else changes."""
 
-import av
 import numpy as np
 import pytest
 from canned import canned, copied
 from command_helpers import command, ran, refused
 from datasets_helpers import tree
-from shared_helpers import content
+from shared_helpers import content, pictures
 
 from handrail.collect.commands import render
 from handrail.controllers.errors import HandrailError
@@ -48,13 +47,6 @@ def fails(root, output):
     assert (done.returncode, len(above)) == (2, 1), done.stderr
     assert line.startswith("error: ")
     return line
-
-
-def pictures(root):
-    """Return every picture of a dataset, decoded, camera by camera."""
-    for path in sorted(root.glob("videos/*/*/*.mp4")):
-        with av.open(str(path)) as video:
-            yield from (frame.to_ndarray(format="rgb24") for frame in video.decode(video=0))
 
 
 @pytest.fixture

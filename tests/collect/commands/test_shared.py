@@ -8,13 +8,12 @@ import sys
 from errno import ENOSPC
 from unittest import mock
 
-import av
 import numpy as np
 import pytest
 from canned import canned
 from command_helpers import command, refused
 from execution_helpers import is_alive
-from shared_helpers import content, saved, started, wait_until, workers_of
+from shared_helpers import content, pictures, saved, started, wait_until, workers_of
 
 from handrail.collect.commands.shared import Shards
 from handrail.collect.config import DatasetConfig, RecordConfig
@@ -56,13 +55,6 @@ def test_two_workers_record_the_same_and_a_merge_that_was_done_is_not_done_again
     record(root)
     assert started(root) == times
     assert not shards.exists()
-
-
-def pictures(root):
-    """Return every picture of a dataset, decoded, in order."""
-    for path in sorted(root.glob("videos/*/*/*.mp4")):
-        with av.open(str(path)) as video:
-            yield from (frame.to_ndarray(format="rgb24") for frame in video.decode(video=0))
 
 
 @pytest.mark.slow

@@ -74,13 +74,13 @@ def test_a_plain_terminal(keys, terminal, clock):
     ]
     assert not readings[3.1].attended  # another window has the focus
     assert readings[3.2].attended
-    assert not terminal.tells
+    assert not terminal.tells_releases
     assert not terminal.written
 
 
 def test_a_terminal_that_tells_releases(keys, terminal, clock):
     readings = play(keys, terminal, clock, "terminal_kitty.json")
-    assert terminal.tells
+    assert terminal.tells_releases
     assert held(readings, "w") == [[0.3, 0.7]]
     assert held(readings, "r") == [[0.6, 0.8]]  # two at once
     assert pressed(readings) == [(0.3, "w"), (0.55, "r"), (0.9, "right"), (1.1, "escape")]

@@ -6,6 +6,7 @@ from collect_helpers import UP, action, environment, hold, moved, over_cube, rea
 
 from handrail.collect.world.scene import Scene, SceneObject, box
 from handrail.collect.world.task import Start
+from handrail.collect.world.tasks import furniture
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.pick_place import PickPlace
 from handrail.controllers.errors import HandrailError
@@ -166,6 +167,7 @@ def test_a_scene_refuses_two_things_of_one_name():
         Scene((thing, thing))
 
 
-def test_no_room_for_obstacles_is_an_error():
+def test_no_room_for_obstacles_is_an_error(monkeypatch):
+    monkeypatch.setattr(furniture, "CLEARANCE", 3.0)
     with pytest.raises(HandrailError, match="no room for"):
-        PickPlace(clearance=3.0).sample(load_model(), np.random.default_rng(0))
+        PickPlace().sample(load_model(), np.random.default_rng(0))
