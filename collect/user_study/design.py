@@ -10,7 +10,7 @@ from msgspec import Meta
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS, check_robot
-from handrail.controllers.errors import HandrailError, shown, unknown_name
+from handrail.controllers.errors import HandrailError, check_known, shown
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import Count, Name, Number, Text
@@ -124,9 +124,7 @@ class UserStudy:
         for thing, (names, choices) in chosen.items():
             if len(set(names)) < len(names):
                 raise HandrailError(f"{thing}: expected each once, got {', '.join(names)}")
-            for name in names:
-                if name not in choices:
-                    raise unknown_name(thing, name, choices)
+            check_known(thing, names, choices)
         description = load_description(self.robot)
         for mode in self.modes:
             description.check_hands(f"mode {mode}", MODES[mode].hands)

@@ -17,7 +17,7 @@ from handrail.collect.world.plant import Plant
 from handrail.collect.world.rendering import Painter
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Start, Task, TaskState, Verdict
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known, unknown_name
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.description import SCENE_CAMERA
 from handrail.controllers.robot.model import RobotModel, load_model
@@ -81,9 +81,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.model: RobotModel = robot if isinstance(robot, RobotModel) else load_model(robot)
         self.fps, self.period, self.real = fps, 1.0 / fps, real
         self.cameras, self.image_size = tuple(cameras), image_size
-        for camera in self.cameras:
-            if camera not in self.model.description.camera_names:
-                raise unknown_name("camera", camera, self.model.description.camera_names)
+        check_known("camera", self.cameras, self.model.description.camera_names)
         self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)

@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.numerics.rotation import matrix_to_axis
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.parts import (
@@ -283,9 +283,7 @@ def _check_names(robot: RobotDescription) -> None:
             raise HandrailError(f"hand: expected {words}, got {hand.name!r}")
     fingers = [hand.gripper.shape for hand in robot.hands if hand.gripper]
     used = [*(name for pair in robot.self_pairs for name in pair), *fingers]
-    for name in used:
-        if name not in names:
-            raise unknown_name("collision shape", name, names)
+    check_known("collision shape", used, names)
     if same := [first for first, second in robot.self_pairs if first == second]:
         raise HandrailError(f"self_collision: pairs: expected two shapes, got {same[0]!r} twice")
 

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 import pyarrow as pa
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.format.episode_rows import EpisodeRow, plain_names, row_files, table_rows
 from handrail.datasets.format.info_file import InfoFile, fill
@@ -185,8 +185,7 @@ def read_rows_of(
     """Read the rows of one episode whose row of metadata is at hand; see `read_frames`."""
     readable = [key for key, feature in info.features.items() if feature.dtype in _READABLE]
     names = readable if columns is None else list(columns)
-    if unknown := [name for name in names if name not in readable]:
-        raise unknown_name("column", unknown[0], readable)
+    check_known("column", names, readable)
     path, number, length = info.root / info.data_file(episode), episode["episode_index"], episode["length"]
     try:
         table = files.open(path).rows(number, length, names)

@@ -8,8 +8,7 @@ import torch
 from handrail.collect.config import RecordConfig
 from handrail.collect.operators.modes import MODES, TeleopMode
 from handrail.collect.operators.operator import Operator, View
-from handrail.collect.operators.scripted.input_map import StickMap
-from handrail.collect.operators.scripted.steering import Gains
+from handrail.collect.operators.scripted.steering import Gains, full_stick
 from handrail.collect.operators.shared.arbiter import Groups
 from handrail.collect.operators.shared.catalogue import ARBITERS
 from handrail.collect.operators.shared.planning import Ensemble, Planner, ThreadedPlanner
@@ -49,14 +48,14 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
     for checkpoint in checkpoints:
         _check_fits(checkpoint, config, env)
     members = [_Driver(load_policy(each.folder), each, env, env.period) for each in checkpoints]
+    channels = Channels.of(env.model.description)
     planner: Planner = members[0]
     if len(members) > 1:
-        planner = Ensemble(
-            members, StickMap(env.model, mode, Gains().within(env.model.description.world)).full
-        )
+        gains = Gains().within(env.model.description.world)
+        planner = Ensemble(members, full_stick(channels, gains))
     if config.is_live:
         planner = ThreadedPlanner(planner, env.period)
-    groups = Groups(Channels.of(env.model.description))
+    groups = Groups(channels)
     arbiter = resolved(ARBITERS.find(config.arbiter).build)(groups, config.arbitration)
     modes = {each.name for each in (mode, *MODES.values()) if _is_completed(each)}
     return SharedOperator(person, planner, arbiter, env.model, modes.__contains__)
