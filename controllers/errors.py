@@ -70,7 +70,7 @@ def unknown_name(thing: str, name: object, choices: Iterable[str]) -> HandrailEr
 
 
 def check_known(thing: str, names: Iterable[object], choices: Collection[Any]) -> None:
-    """Check that names are among the choices, as `unknown_name` says."""
+    """Raise what `unknown_name` returns for the first of some names that is none of the choices."""
     for name in names:
         if name not in choices:
             raise unknown_name(thing, name, choices)

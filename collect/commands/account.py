@@ -23,11 +23,7 @@ _DROPPED = {
     EpisodeEvent.RESTART: "begun again",
     EpisodeEvent.QUIT: "not finished",
 }
-_NEXT = (
-    "handrail-inspect {root}    # what was recorded",
-    "handrail-replay {root}    # do the same again",
-    "handrail-train {root} --output outputs/policy",
-)
+_NEXT = ("handrail-inspect {root}", "handrail-replay {root}", "handrail-train {root} --output outputs/policy")
 
 
 def _why_dropped(outcome: Outcome) -> str:

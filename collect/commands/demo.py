@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal
 
 NEXT = """Next:
-  {bin}handrail-cockpit    # drive yourself, in the browser
+  {bin}handrail-cockpit
   {bin}handrail-inspect {root}
   {bin}handrail-replay {root}
   {bin}handrail-record {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
