@@ -17,8 +17,9 @@ NEXT = """Next:
   {bin}handrail-replay {root}
   {bin}handrail-record {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
   {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0 \
---save 1 --output-dir {folder}    # extra: display; without --save it needs a screen
-  {bin}handrail-record --help"""
+--save 1 --output-dir {folder}
+  {bin}handrail-record --help
+lerobot-dataset-viz needs the extra display, and without --save a screen."""
 
 
 def demo(config: DemoConfig) -> int:
