@@ -15,6 +15,7 @@ from lerobot.policies.factory import make_pre_post_processors
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import open_dataset
+from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.encoder.samples import DRIVEN, OTHER, START, Drawn, batches
@@ -24,6 +25,7 @@ from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import evaluate
 from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.trained import TrainedPolicy
 from handrail.policies.imitation.training.encoded import tellable
 from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train as train_policy
@@ -127,7 +129,7 @@ def looking(tmp_path_factory):
         output=str(folder / "policy"),
         steps=2,
     )
-    return folder, settings, train_policy(settings, quiet=True)
+    return folder, settings, train_policy(settings)
 
 
 def test_a_policy_learns_from_the_truth(looking):
@@ -182,8 +184,15 @@ def test_anybody_can_run_it(looking):
     torch.testing.assert_close(first[ENVIRONMENT], told[ENVIRONMENT])  # whatever is told
 
 
-def test_other_pictures_are_shown(looking, tmp_path):
+def test_other_pictures_are_shown(looking, tmp_path, monkeypatch):
     _, _, place = looking
+    seen, act = [], TrainedPolicy.act
+
+    def watched(self, state, environment=None, images=None, task=""):
+        seen.append(np.mean([picture.mean() for picture in images.values()]))
+        return act(self, state, environment, images, task)
+
+    monkeypatch.setattr(TrainedPolicy, "act", watched)
     asked = EvaluateConfig(
         checkpoints=(str(place),),
         episodes=1,
@@ -196,6 +205,9 @@ def test_other_pictures_are_shown(looking, tmp_path):
     arms = evaluate(asked)["arms"]
     assert list(arms) == ["ee", "ee cameras blank", "ee pictures of another episode"]
     assert json.loads((tmp_path / "e.json").read_text())["arms"].keys() == arms.keys()
+    plain, blank, swapped = np.split(np.array(seen), 3)
+    assert max(blank) == 0.0 < min(*plain, *swapped)
+    assert plain[0] != swapped[0]
 
 
 @pytest.mark.parametrize("asked", [{"robot": "lekiwi"}, {"robot": "moved.toml"}, {"task": "pick_place"}])
@@ -228,6 +240,16 @@ def test_a_draft_of_something_else_is_refused(tmp_path):
     torch.save({"a": 1}, settings.file.with_suffix(".training"))
     with pytest.raises(HandrailError, match="say --overwrite"):
         train(settings)
+
+
+def test_two_trainings_never_write_one_encoder(tmp_path):
+    settings = config(tmp_path)
+    with (
+        DatasetLock(tmp_path / ".e.safetensors.lock"),
+        pytest.raises(HandrailError, match="by another handrail-encoder"),
+    ):
+        train(settings)
+    assert not settings.file.with_suffix(".training").exists()
 
 
 def test_an_encoder_that_is_there_is_never_replaced_unasked(tmp_path):
