@@ -17,7 +17,7 @@ _DEFLECTION = 0.3  # of a stick
 
 
 class Rehearsal:
-    """Steers in each mode for some periods, brakes, goes back to the beginning, and ends.
+    """Steers in each mode for some periods, brakes, steers, takes that back, steers again, and ends.
 
     Args:
         model: of the robot.
@@ -46,5 +46,5 @@ class Rehearsal:
             for focus in ("hand", "base") if mode.by_focus else ("hand",):
                 yield from (Setting(mode, focus, self._hand) for _ in range(_PERIODS))
         yield from (EpisodeEvent.PAUSE for _ in range(_BRAKING))
-        yield EpisodeEvent.UNDO
-        yield from (Setting(self._modes[0], hand=self._hand) for _ in range(_PERIODS))
+        again = [Setting(self._modes[0], hand=self._hand)] * _PERIODS
+        yield from (*again, EpisodeEvent.UNDO, *again)

@@ -239,9 +239,10 @@ def test_a_warm_up_tries_every_mode_and_leaves_no_trace(env):
             return super().update(state, intent)
 
     controller = Watched(env.model, env.period)
-    Session(env, controller, Rehearsal(env.model, modes), undoes=True).run(3)
+    outcome = Session(env, controller, Rehearsal(env.model, modes), undoes=True).run(3)
     assert {mode for mode, _ in asked} == set(modes)
     assert len({mask for mode, mask in asked if mode == "switching"}) == 2  # hand and base
+    assert outcome.undos == 1
     assert not env.state().commanded.any()
 
 
