@@ -9,6 +9,7 @@ from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 
+_PATIENCE = 0.1  # [s]
 _AGAIN = 0.5  # after which a card is shown again: the web server may have been started anew [s]
 
 
@@ -30,13 +31,9 @@ class Cards:
             self._server.pipe.send_surely(Kind.CARD, card, (Kind.CARD,))
             self._shown, self._at = dict(card), time.monotonic()
 
-    def hear(self, patience: float = 0.1) -> list[CardAnswer]:
-        """Return what was answered, waiting a little for it; a STOP is left for the next episode.
-
-        Args:
-            patience: how long [s].
-        """
-        select.select([self._server.pipe], [], [], patience)
+    def hear(self) -> list[CardAnswer]:
+        """Return what was answered, waiting a little for it; a STOP is left for the next episode."""
+        select.select([self._server.pipe], [], [], _PATIENCE)
         messages = self._server.receive()
         self._server.unread = [each for each in messages if each[0] is Kind.STOP]
         return [CardAnswer(**value) for kind, value in messages if kind is Kind.ANSWER]

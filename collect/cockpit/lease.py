@@ -19,14 +19,13 @@ class Lease:
         self.holder = self.asking = ""
         self._clock, self._ends = clock, math.inf  # for whoever left; never while the holder is there [s]
 
-    def take(self, page: str) -> bool:
+    def take(self, page: str) -> None:
         """Let a page drive if nobody does, or it drove a moment ago; else take note that it asks."""
         if not self.is_free_for(page):
             self.asking = page
-            return False
+            return
         self.holder, self._ends = page, math.inf
         self.asking = "" if self.asking == page else self.asking
-        return True
 
     def is_free_for(self, page: str) -> bool:
         """Whether a page may drive at once."""

@@ -84,12 +84,11 @@ class DataFile:
         self._spans = _episode_spans(self._file.metadata)
         self._last: tuple[list[int], list[str] | None, pa.Table] | None = None  # what was read last
 
-    def rows(self, episode: int, length: int, columns: Sequence[str] | None = None) -> pa.Table:
+    def rows(self, episode: int, columns: Sequence[str] | None = None) -> pa.Table:
         """Return the rows of an episode, in their order.
 
         Args:
             episode: Its number.
-            length: How many rows it should have; another number is an error of the caller's to raise.
             columns: Which columns; all of them without.
 
         Raises:
@@ -97,8 +96,7 @@ class DataFile:
         """
         wanted = None if columns is None else list(dict.fromkeys((_EPISODE, *columns)))
         near = [place for place, (least, most) in enumerate(self._spans) if least <= episode <= most]
-        found = self._read(near, episode, wanted)
-        return found if found.num_rows == length else self._read([*range(len(self._spans))], episode, wanted)
+        return self._read(near, episode, wanted)
 
     def all(self) -> pa.Table:
         """Return all rows.

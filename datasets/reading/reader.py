@@ -188,7 +188,7 @@ def read_rows_of(
     check_known("column", names, readable)
     path, number, length = info.root / info.data_file(episode), episode["episode_index"], episode["length"]
     try:
-        table = files.open(path).rows(number, length, names)
+        table = files.open(path).rows(number, names)
         frames = {name: _values(table.column(name), info.features[name]) for name in names}
     except FileNotFoundError as error:
         raise HandrailError(

@@ -56,7 +56,7 @@ def _pictures_fault(path: Path, key: str, manifest: Manifest, record: EpisodeRec
 
 def _rows_fault(file: DataFile, manifest: Manifest, record: EpisodeRecord, alone: bool) -> str:
     """Return how rows that can be read differ from those that were saved, or ""."""
-    table = file.all() if alone else file.rows(record.episode, record.length)
+    table = file.all() if alone else file.rows(record.episode)
     lacking = [name for name in stored_features(manifest.features) if name not in table.column_names]
     if lacking or table.num_rows != record.length:
         return f"{table.num_rows} rows instead of {record.length}" + "".join(f", no {n}" for n in lacking[:1])

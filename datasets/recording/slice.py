@@ -73,7 +73,7 @@ class EpisodeSlice:
             totals: What the episodes before it add up to.
             files: Opens the file of the rows.
         """
-        whole = files.open(self.data).rows(self.record.episode, self.record.length)
+        whole = files.open(self.data).rows(self.record.episode)
         if whole.num_rows != self.record.length:
             raise ValueError(f"{self.data}: {whole.num_rows} rows instead of {self.record.length}")
         lacking = [field for field in schema if field.name not in whole.schema.names]

@@ -33,5 +33,5 @@ def test_an_episode_is_found_however_its_file_is_cut(made, tmp_path_factory):
     with data_file.data_files() as opened:
         for episode in range(owner.min() - 1, owner.max() + 2):
             expected = np.flatnonzero(owner == episode).tolist()
-            found = opened.open(path).rows(episode, len(expected), ["place"])
+            found = opened.open(path).rows(episode, ["place"])
             assert found.column("place").to_pylist() == expected

@@ -53,6 +53,6 @@ def _call(folder: str, change: int, log: str, function: Callable[..., object], a
 
     from handrail.policies.imitation.evaluation import evaluation
 
-    evaluation._SAVE_EVERY = 0.0  # after every rollout, so that there is much to write
+    evaluation.SAVE_EVERY = 0.0  # after every rollout, so that there is much to write
     kill_at(folder, change)
     function(*arguments)

@@ -26,7 +26,7 @@ from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.trained import load_policy
 
 _PRELOAD = ("handrail.policies.imitation.evaluation.rollout",)
-_SAVE_EVERY = 2.0  # [s]
+SAVE_EVERY = 2.0  # [s]
 
 
 class UnevaluatedError(HandrailError):
@@ -90,7 +90,7 @@ def evaluate(
                     file.add(condition, result.value)
                     successes += result.value["success"]
                     execution.say(f"{successes}/{count} succeeded")
-                    if monotonic() - saved > _SAVE_EVERY:
+                    if monotonic() - saved > SAVE_EVERY:
                         file.save()
                         saved = monotonic()
         finally:

@@ -101,7 +101,6 @@ class TrainingRun:
         held_out: MemoryDataset | None,
         losses: dict[int, float],
         every: int,
-        quiet: bool = False,
     ) -> None:
         """Train to the end; one of the processes writes checkpoints and the curve, and shows the progress.
 
@@ -110,7 +109,6 @@ class TrainingRun:
             held_out: episodes on which the loss is measured.
             losses: on these, by update: as they are measured.
             every: updates between two measurements.
-            quiet: show no progress.
 
         Raises:
             KeyboardInterrupt: it was interrupted; the update is finished, and its checkpoint written.
@@ -120,9 +118,9 @@ class TrainingRun:
         around = settings.optimizer.grad_clip_norm, self._accelerator, self._schedule
         curve = Curve(self._folder, self._step) if main else None
         columns = TextColumn("training"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        loss, shown = TextColumn("{task.description}"), main and not quiet
+        loss = TextColumn("{task.description}")
         with (
-            Progress(*columns, loss, console=Terminal(stderr=True), disable=not shown) as progress,
+            Progress(*columns, loss, console=Terminal(stderr=True), disable=not main) as progress,
             Interrupts() as interrupts,
             interrupts.deferred(),
         ):

@@ -43,12 +43,11 @@ _WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if 
 _OURS = {CURVE, f".{CURVE}.partial", "training.json", "checkpoints"}  # training.json: of an earlier version
 
 
-def train(config: TrainConfig, quiet: bool = False) -> Path:
+def train(config: TrainConfig) -> Path:
     """Train, or go on training, and return the folder of the policy in the last checkpoint.
 
     Args:
         config: what to train on what.
-        quiet: show no progress.
     """
     config.check()
     lock = beside(Path(os.path.realpath(config.folder)), "lock"), "trainings in", "handrail-train"
@@ -71,7 +70,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
                 for path in config.folder.glob("*") if config.overwrite and _MAIN else ():
                     remove(path)  # not before all else is sure
                 measured = out[0] if out else None, losses, config.eval_steps
-                training.train(lambda step: _meta(source, step, losses), *measured, quiet)
+                training.train(lambda step: _meta(source, step, losses), *measured)
             checkpoint = last_checkpoint(config.folder)
         assert checkpoint is not None
         return checkpoint / MODEL

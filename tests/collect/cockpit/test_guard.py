@@ -93,16 +93,20 @@ def test_nobody_needs_the_token_on_this_computer(clock):
 
 def test_one_page_drives_and_a_reload_keeps_its_place(clock):
     lease = Lease(clock)
-    assert lease.take("first")
-    assert not lease.take("second")
+    lease.take("first")
+    lease.take("second")
+    assert lease.drives("first")
+    assert not lease.drives("second")
+    lease.leave("first")
+    lease.take("third")
+    assert not lease.drives("third")
+    assert not lease.drives("first")
+    lease.take("first")
     assert lease.drives("first")
     lease.leave("first")
-    assert not lease.take("third")
-    assert not lease.drives("first")
-    assert lease.take("first")
-    lease.leave("first")
     clock.now += 6.0
-    assert lease.take("second")
+    lease.take("second")
+    assert lease.drives("second")
     assert not lease.drives("first")
 
 
@@ -110,7 +114,8 @@ def test_a_page_that_asked_while_another_was_expected_back_drives_when_it_is_not
     lease = Lease(clock)
     lease.take("first")
     lease.leave("first")
-    assert not lease.take("second")
+    lease.take("second")
+    assert not lease.drives("second")
     lease.settle()
     assert not lease.drives("second")
     clock.now += 6.0
@@ -129,4 +134,5 @@ def test_the_driver_gives_the_lease_to_who_asks(clock):
     assert lease.drives("second")
     assert not lease.asking
     lease.give("second")
-    assert lease.take("third")
+    lease.take("third")
+    assert lease.drives("third")

@@ -16,4 +16,4 @@ def recorded():
 def trained(recorded, tmp_path_factory):
     """A training that was never interrupted, and its settings."""
     config = tiny(recorded, tmp_path_factory.mktemp("trained") / "policy")
-    return train(config, quiet=True), config
+    return train(config), config

@@ -98,7 +98,7 @@ def batches(config):
 
     run_update = run.update_policy
     with mock.patch.object(run, "update_policy", update):
-        train(config, quiet=True)
+        train(config)
     return seen
 
 
@@ -148,14 +148,14 @@ def test_lerobot_s_own_take_overs_say_only_that_somebody_intervened(tmp_path):
     for kind, expected in (("only", [1, 2]), ("weighted", [1, 1, 2, 2, 0, 3, 4, 5])):
         config = tiny(root, tmp_path / kind, corrections=kind, actions="recorded", steps=1)
         assert read_source(config).dataset(policy_config(config)).draws.frames().tolist() == expected
-        assert train(config, quiet=True).is_dir()
+        assert train(config).is_dir()
 
 
 @pytest.mark.parametrize("kind", ["only", "weighted"])
 def test_a_resumed_training_draws_the_same(kind, takeovers, tmp_path):
     config = tiny(takeovers, tmp_path / "policy", corrections=kind)
-    folder = train(config, quiet=True)
-    assert weights(train(cut(config, tmp_path / "cut"), quiet=True)) == weights(folder)
+    folder = train(config)
+    assert weights(train(cut(config, tmp_path / "cut"))) == weights(folder)
     words = f"--corrections all: expected {kind} as the training began"
     refused(dataclasses.replace(cut(config, tmp_path / "other"), corrections="all"), words)
 
@@ -171,7 +171,7 @@ def statistics(folder):
 
 def test_a_training_goes_on_from_an_earlier_policy(takeovers, tmp_path):
     """With its weights and its normalisation, though the data are others; a resumed one is the same."""
-    base = train(tiny(canned(record_takeovers, 1, shared=False), tmp_path / "base"), quiet=True)
+    base = train(tiny(canned(record_takeovers, 1, shared=False), tmp_path / "base"))
     config = tiny(takeovers, tmp_path / "policy", corrections="only", init=str(tmp_path / "base"))
     first = {}
 
@@ -181,14 +181,14 @@ def test_a_training_goes_on_from_an_earlier_policy(takeovers, tmp_path):
 
     run_update = run.update_policy
     with mock.patch.object(run, "update_policy", update):
-        folder = train(config, quiet=True)
+        folder = train(config)
     earlier = load_file(base / "model.safetensors")
     assert all(torch.equal(first[key], earlier[key]) for key in earlier)
     assert statistics(folder) == statistics(base) != {}
     assert weights(folder) != weights(base)
     again = cut(config, tmp_path / "cut")
     shutil.rmtree(tmp_path / "base")  # no longer needed
-    assert weights(train(again, quiet=True)) == weights(folder)
+    assert weights(train(again)) == weights(folder)
 
 
 @pytest.mark.parametrize(
@@ -219,16 +219,16 @@ def test_an_earlier_policy_of_other_numbers_is_refused(recorded, base_policy, tm
 def test_an_intent_goes_on_with_the_masks_of_before(takeovers, tmp_path):
     line = "--task reach --mode ee --no_physics --time_limit 1 --dataset.num_episodes 1"
     hand = canned(record_by_command, line)
-    train(tiny(hand, tmp_path / "hand", actions="intent"), quiet=True)
+    train(tiny(hand, tmp_path / "hand", actions="intent"))
     both = tiny(takeovers, tmp_path / "both", actions="intent")
     refused(dataclasses.replace(both, init=str(tmp_path / "hand")), "masks; it has none of base.vx")
-    masks = read_meta(train(both, quiet=True)).interface.masks
+    masks = read_meta(train(both)).interface.masks
     less = tiny(hand, tmp_path / "less", actions="intent", init=str(tmp_path / "both"))
-    assert read_meta(train(less, quiet=True)).interface.masks == masks
+    assert read_meta(train(less)).interface.masks == masks
 
 
 @pytest.fixture(scope="module")
 def base_policy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("base") / "policy"
-    train(tiny(canned(record_takeovers, 1, shared=False), folder), quiet=True)
+    train(tiny(canned(record_takeovers, 1, shared=False), folder))
     return folder

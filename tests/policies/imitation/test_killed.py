@@ -61,7 +61,7 @@ def test_a_training_killed_while_it_writes(tmp_path):
     assert kept, "killed too early to see anything"
     whole = tiny(recorded, tmp_path / "whole", steps=60, save_freq=4)
     resumed = tiny(recorded, output, steps=60, save_freq=4, resume=True)
-    assert weights(train(resumed, quiet=True)) == weights(train(whole, quiet=True))
+    assert weights(train(resumed)) == weights(train(whole))
 
 
 def rows_of(file: Path) -> list[dict]:

@@ -31,7 +31,7 @@ ROUNDING = 1e-4  # of what is sent, over the limits
 def policy(tmp_path_factory):
     recorded = canned(record_by_command, "--task reach --dataset.num_episodes 2")
     output = tmp_path_factory.mktemp("intents") / "policy"
-    return train(tiny(recorded, output, actions="intent", steps=40), quiet=True)
+    return train(tiny(recorded, output, actions="intent", steps=40))
 
 
 class Periods:

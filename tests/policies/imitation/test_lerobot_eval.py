@@ -185,7 +185,7 @@ def run(monkeypatch, module, *words):
 
 
 def trained(root, output, actions):
-    return train(tiny(root, output, actions=actions, steps=40), quiet=True)
+    return train(tiny(root, output, actions=actions, steps=40))
 
 
 def both(folder, environment, **settings):

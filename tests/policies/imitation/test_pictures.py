@@ -27,7 +27,7 @@ SMALL = "replace_final_stride_with_dilation=0"
 def test_a_policy_sees_cameras_where_it_is_asked_to_and_the_scene_unless_it_is_not(scene, tmp_path):
     root = canned(write_dataset, lengths=(5, 6), cameras=("wrist",))
     config = tiny(root, tmp_path / "policy", SMALL, steps=1, images=True, scene=scene)
-    policy = load_policy(train(config, quiet=True))
+    policy = load_policy(train(config))
     assert list(policy.policy.config.image_features) == ["observation.images.wrist"]
     assert ("observation.environment_state" in policy.policy.config.input_features) == scene
     acted = []
@@ -47,7 +47,7 @@ def test_a_policy_sees_the_same_picture_while_it_acts_as_while_it_learnt(tmp_pat
         monkeypatch.setattr(ACTPolicy, name, keeping(batches, getattr(ACTPolicy, name)))
     root = canned(write_dataset, lengths=(5, 6), cameras=("wrist",))
     config = tiny(root, tmp_path / "policy", SMALL, steps=1, batch_size=11, images=True)
-    policy = load_policy(train(config, quiet=True))
+    policy = load_policy(train(config))
     recorded, key = LeRobotDataset("handrail/test", root=root, return_uint8=True), "observation.images.wrist"
     for frame, index in enumerate(learnt[0]["index"].tolist()):
         sample: Any = recorded[int(index)]
@@ -60,8 +60,8 @@ def test_a_policy_sees_the_same_picture_while_it_acts_as_while_it_learnt(tmp_pat
 def test_a_training_on_pictures_goes_on_to_the_bit(tmp_path):
     root = canned(write_dataset, lengths=(130, 130), cameras=("wrist",))  # a count beyond a byte
     config = tiny(root, tmp_path / "policy", SMALL, images=True)
-    whole = train(config, quiet=True)
-    assert weights(train(cut(config, tmp_path / "cut"), quiet=True)) == weights(whole)
+    whole = train(config)
+    assert weights(train(cut(config, tmp_path / "cut"))) == weights(whole)
 
 
 def test_a_training_does_not_go_on_with_other_pictures(tmp_path, monkeypatch):
@@ -74,7 +74,7 @@ def test_a_training_does_not_go_on_with_other_pictures(tmp_path, monkeypatch):
         darker = write_dataset(tmp_path / "dark", lengths=(5, 6), cameras=("wrist",))
     config = tiny(root, tmp_path / "policy", SMALL, images=True)
     source, moved = read_source(config), replace(config, dataset=StoredConfig(root=str(darker)))
-    began = read_meta(train(config, quiet=True))
+    began = read_meta(train(config))
     assert began.data == source.digest
     with pytest.raises(HandrailError, match="got others"):
         read_source(moved, began)

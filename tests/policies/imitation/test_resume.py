@@ -26,22 +26,22 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
     """With dropout, over the end of an epoch: 24 samples are three batches."""
     folder, config = trained
     again = cut(config, tmp_path / "cut")
-    assert weights(train(again, quiet=True)) == weights(folder)
-    longer = train(dataclasses.replace(again, steps=8), quiet=True)
+    assert weights(train(again)) == weights(folder)
+    longer = train(dataclasses.replace(again, steps=8))
     assert read_meta(longer).steps == 8
 
 
 def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recorded, tmp_path):
     part = tiny(recorded, tmp_path / "whole", episodes=2, draw=3)
-    whole = train(part, quiet=True)
+    whole = train(part)
     grown = StoredConfig(root=str(canned(write_dataset, lengths=(9, 7, 8, 5, 6))))
-    assert weights(train(cut(part, tmp_path / "cut"), quiet=True)) == weights(whole)
+    assert weights(train(cut(part, tmp_path / "cut"))) == weights(whole)
     later = dataclasses.replace(cut(part, tmp_path / "later"), dataset=grown)
     chosen = read_source(dataclasses.replace(later, resume=False)).selection
     before, meta = read_source(part).selection, read_meta(whole)
     assert [row["episode_index"] for row in before.rows] == list(meta.episodes)
     assert [row["episode_index"] for row in chosen.rows] != list(meta.episodes), "a draw that shows nothing"
-    resumed = train(later, quiet=True)
+    resumed = train(later)
     assert weights(resumed) == weights(whole)
     assert read_meta(resumed).trained_on == meta.trained_on
 
@@ -58,12 +58,12 @@ def test_a_training_does_not_go_on_with_other_data_steps_or_sizes(trained, tmp_p
 
 def test_the_curve_has_a_row_every_fifty_updates_also_after_a_cut(recorded, tmp_path):
     config = tiny(recorded, tmp_path / "policy", steps=100, save_freq=50)
-    train(config, quiet=True)
+    train(config)
     first = read_curve(config.folder)
     assert [row["step"] for row in first] == [50, 100]
     assert first[1]["loss"] < first[0]["loss"]
     shutil.rmtree(config.folder / "checkpoints" / "000100")
-    train(dataclasses.replace(config, resume=True), quiet=True)
+    train(dataclasses.replace(config, resume=True))
     again = read_curve(config.folder)
     assert [(row["step"], row["loss"]) for row in again] == [(row["step"], row["loss"]) for row in first]
 
@@ -78,8 +78,8 @@ def test_a_training_that_is_interrupted_saves_a_checkpoint_and_goes_on_to_the_sa
         mock.patch.object(run, "update_policy", interrupted(at=63)),
         pytest.raises(KeyboardInterrupt, match=words),
     ):
-        train(cut_off, quiet=True)
-    policies = train(dataclasses.replace(cut_off, resume=True), quiet=True), train(whole, quiet=True)
+        train(cut_off)
+    policies = train(dataclasses.replace(cut_off, resume=True)), train(whole)
     assert weights(policies[0]) == weights(policies[1])
     metas = [read_meta(each).validation for each in policies]
     assert metas[0] == metas[1]

@@ -63,7 +63,7 @@ def steps(interface, by=BY):
 @pytest.fixture(scope="module", params=["realised", "intent"])
 def checkpoint(request, recorded, tmp_path_factory):
     output = tmp_path_factory.mktemp(request.param) / "policy"
-    return request.param, train(tiny(recorded, output, actions=request.param, steps=3), quiet=True)
+    return request.param, train(tiny(recorded, output, actions=request.param, steps=3))
 
 
 def seen():
@@ -141,8 +141,8 @@ def test_a_fresh_process_that_discovers_our_package_loads_it(checkpoint):
 
 
 def test_a_training_that_goes_on_keeps_the_steps_and_adds_none(recorded, tmp_path):
-    begun = train(tiny(recorded, tmp_path / "policy", steps=2), quiet=True)
-    gone_on = train(tiny(recorded, tmp_path / "policy", steps=4, resume=True), quiet=True)
+    begun = train(tiny(recorded, tmp_path / "policy", steps=2))
+    gone_on = train(tiny(recorded, tmp_path / "policy", steps=4, resume=True))
     for processor in ("policy_preprocessor.json", "policy_postprocessor.json"):
         assert (gone_on / processor).read_bytes() == (begun / processor).read_bytes()
 

@@ -65,13 +65,13 @@ def test_a_dataset_of_another_tool_needs_its_columns_as_they_are(tmp_path):
 @pytest.mark.parametrize(("fps", "robot"), [(5, "SO-100 (follower)"), (120, "me/so100")])
 def test_whatever_its_rate_and_its_robot_s_name_a_policy_can_be_read_again(fps, robot, tmp_path):
     root = canned(write, (STATE, "action"), fps=fps, robot=robot)
-    policy = train(tiny(root, tmp_path / "policy", steps=1, actions="recorded"), quiet=True)
+    policy = train(tiny(root, tmp_path / "policy", steps=1, actions="recorded"))
     assert read_meta(policy).fps == fps
 
 
 def test_a_policy_of_another_rate_is_no_beginning(tmp_path):
     slow, fast = (canned(write, (STATE, "action"), fps=fps) for fps in (20, 50))
-    train(tiny(slow, tmp_path / "slow", steps=1, actions="recorded"), quiet=True)
+    train(tiny(slow, tmp_path / "slow", steps=1, actions="recorded"))
     config = tiny(fast, tmp_path / "fast", actions="recorded", init=str(tmp_path / "slow"))
     refused(config, "--init .*: expected a policy of 50 Hz, got 20 Hz")
 
@@ -96,7 +96,7 @@ def test_without_a_scene_the_robot_s_state_stands_for_it(policy, tmp_path):
     config = tiny(canned(write, (STATE, "action")), tmp_path / "policy", **settings)
     columns = read_source(config).columns
     np.testing.assert_array_equal(columns[ENVIRONMENT], columns[STATE])
-    loaded = load_policy(train(config, quiet=True))
+    loaded = load_policy(train(config))
     state = columns[STATE][0]
     assert loaded.act(state, state).shape == columns["action"][0].shape
 
@@ -110,7 +110,7 @@ def test_whole_numbers_are_normalised_like_others(tmp_path, monkeypatch):
         ACTPolicy, "forward", lambda self, batch: learnt.append(batch) or forward(self, batch)
     )
     root = canned(write, (STATE, "action"), "int64")
-    train(tiny(root, tmp_path / "policy", actions="recorded", steps=1, batch_size=12), quiet=True)
+    train(tiny(root, tmp_path / "policy", actions="recorded", steps=1, batch_size=12))
     expected = (np.arange(12) - 5.5) / np.std(np.arange(12))
     for key in (STATE, "action"):
         seen = learnt[0][key].reshape(12, -1)[:, 0].numpy()
@@ -140,7 +140,7 @@ def test_an_intent_of_several_modes_is_refused(modes, said, tmp_path):
     refused(tiny(**config), f"--actions intent: expected episodes of one teleop mode.*{said}")
     assert not (tmp_path / "policy").exists()
     if "ee" in modes:
-        assert read_meta(train(tiny(**config, steps=1, mode="ee"), quiet=True)).mode == "ee"
+        assert read_meta(train(tiny(**config, steps=1, mode="ee"))).mode == "ee"
 
 
 def test_what_a_dataset_lacks_is_not_fetched_from_anywhere(tmp_path):

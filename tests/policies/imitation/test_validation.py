@@ -27,7 +27,7 @@ def many():
 def measured(many, tmp_path_factory):
     """A training that measures, and its settings."""
     config = tiny(many, tmp_path_factory.mktemp("measured") / "policy", "dropout=0.1", **MEASURED)
-    return train(config, quiet=True), config
+    return train(config), config
 
 
 @pytest.mark.parametrize(("episodes", "share", "held"), [(7, 0.1, 5), (60, 0.1, 6), (100, 0.2, 20)])
@@ -69,7 +69,7 @@ def test_it_is_measured_every_so_many_updates_and_after_the_last(measured):
     found = read_meta(folder).validation
     assert sorted(map(int, found)) == [5, 10, 12]
     assert len({*found.values()}) == 3
-    assert train(dataclasses.replace(config, resume=True), quiet=True) == folder  # nothing is left to do
+    assert train(dataclasses.replace(config, resume=True)) == folder  # nothing is left to do
 
 
 def test_a_training_that_began_with_a_stopping_rule_is_refused(measured, tmp_path):
@@ -86,14 +86,14 @@ def test_a_training_that_began_with_a_stopping_rule_is_refused(measured, tmp_pat
     again = dataclasses.replace(config, output=str(cut), resume=True)
     refused(again, "--resume: expected a training of all updates")
     write_json(file, content | {"training": content["training"] | {"patience": 0, "improvement": 0.02}})
-    assert train(again, quiet=True)
+    assert train(again)
 
 
 def test_measuring_changes_nothing(many, tmp_path):
     """The same updates with and without measurements in between: nothing random is used up."""
     config = tiny(many, tmp_path / "often", "dropout=0.1", eval_split=0.1, eval_steps=1)
     rarely = dataclasses.replace(config, output=str(tmp_path / "rarely"), eval_steps=100)
-    assert weights(train(config, quiet=True)) == weights(train(rarely, quiet=True))
+    assert weights(train(config)) == weights(train(rarely))
 
 
 def test_cut_off_anywhere_it_ends_the_same_to_the_bit(measured, tmp_path):
@@ -105,6 +105,6 @@ def test_cut_off_anywhere_it_ends_the_same_to_the_bit(measured, tmp_path):
         shutil.copytree(config.folder, cut, symlinks=True)
         for name in whole[kept:]:
             shutil.rmtree(cut / "checkpoints" / name)
-        again = train(dataclasses.replace(config, output=str(cut), resume=True), quiet=True)
+        again = train(dataclasses.replace(config, output=str(cut), resume=True))
         assert weights(again) == weights(folder)
         assert read_meta(again).validation == read_meta(folder).validation
