@@ -128,12 +128,12 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 def policy(folder: Path) -> dict:
     out = folder / "policy"
     run("train", str(folder / "ee"), f"--output={out}", "--actions=intent", "--steps=200", "--device=cpu")
-    weights = sorted(out.rglob("model.safetensors"))
+    weights = {str(path.relative_to(out)): path.read_bytes() for path in out.rglob("model.safetensors")}
     place = folder / "evaluation.json"
     run("evaluate", str(out), "--episodes=6", f"--json={place}", "--workers=1")
     rollouts = numbers(json.loads(place.read_text()))
     return {
-        "weights": {path.name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for path in weights},
+        "weights": {name: hashlib.sha256(weights[name]).hexdigest()[:16] for name in sorted(weights)},
         "curve": numbers(rows_of(out / "curve.csv")),
         **{f"evaluation {key}": value for key, value in rollouts.items()},
     }

@@ -151,6 +151,22 @@ WRONG = {
         "velocity = [1.0, 1.0, 0.8, 0.1, 3.0",
         "velocity of at most 2, got 3.0",
     ),
+    "slow": (
+        r"acceleration = \[1.0, 1.0, 0.8, 0.2, 4.0",
+        "acceleration = [1.0, 1.0, 0.8, 0.2, 100.0",
+        "left_joint0: expected full velocity in",
+    ),
+    "ends": (
+        r"position_upper = \[3.0, 3.0, 6.283185, 0.04, 2.5",
+        "position_upper = [3.0, 3.0, 6.283185, 0.04, 2.6",
+        "left_joint0: expected positions inside the URDF's -2.5 to 2.5, got -2.5 to 2.6",
+    ),
+    "room": (r"q = \[((?:[^,]+, ){6})[^,]+", r"q = [\g<1>2.49", "rad from their limits, got 0.010"),
+    "thin": (
+        r"box = \[0.241, 0.071, 0.071\]",
+        "box = [0.024, 0.071, 0.071]",
+        "link left1: no collision shape",
+    ),
     "urdf": (r'urdf = "two.urdf"', 'urdf = "two.toml"', "URDF"),
     "toml": (r"^name = ", "name ", "not valid TOML"),
 }
@@ -167,20 +183,23 @@ def test_what_is_wrong_is_one_line(case, file):
 
 
 def test_a_home_that_touches_itself_or_is_stretched_out_is_said(file, made):
-    q = np.zeros(made.model().size)
+    joints, q = made.model().joints, np.zeros(made.model().size)
+    q[joints.index("left_joint0")], q[joints.index("right_joint0")] = -1.2, 1.2  # stretched arms that cross
     made.tables["home"], before = {"q": q}, made.tables["home"]
     file.write_text(toml_text(made.tables))
     made.tables["home"] = before
-    assert any("singularity" in fault for fault in faults(file))
+    said = faults(file)
+    assert any("singularity" in fault for fault in said)
+    assert any(re.search("left. and right. overlap by", fault) for fault in said)
 
 
 def test_a_srdf_leaves_out_only_what_did_not_meet(tmp_path):
     pairs = [("left5", "right5"), ("left0", "right5")]
     lines = "".join(f'<disable_collisions link1="{a}" link2="{b}" reason="User"/>' for a, b in pairs)
     (tmp_path / "two.srdf").write_text(f'<robot name="two">{lines}</robot>')
-    assert {frozenset(pair) for pair in pairs} <= {
-        frozenset(pair) for pair in made_in(tmp_path).model().description.self_pairs
-    }
+    met = {frozenset(pair) for pair in pairs}
+    assert met <= {frozenset(pair) for pair in made_in(tmp_path).model().description.self_pairs}
+    assert Source.find(str(tmp_path / "two.urdf")).disabled_pairs() == met
 
 
 @pytest.mark.parametrize("hands", [{"": "nowhere"}, {"": "base"}])

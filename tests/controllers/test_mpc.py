@@ -124,7 +124,7 @@ def test_the_quadratic_is_that_of_the_cost():
     np.testing.assert_allclose(found, band, rtol=1e-4, atol=1e-2)
 
 
-def test_a_plan_knows_whether_it_is_a_solution():
+def test_what_tests_call_a_solution_can_be_none():
     MPC.reset()
     problem = MPC.build_problem(STILL, asking(np.full(18, 0.2), "ee")(0.0))
     MPC.update(STILL, asking(np.full(18, 0.2), "ee")(0.0))

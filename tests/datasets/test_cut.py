@@ -80,7 +80,9 @@ def test_a_stretch_shows_its_pictures(video, tmp_path, first, count):
 
 def test_more_than_there_is_cannot_be_cut(video, tmp_path):
     for first, count in ((20, 9), (40, 2)):
-        with pytest.raises(HandrailError, match="expected"):
+        with pytest.raises(
+            HandrailError, match=f"expected the pictures {first} to {first + count - 1}, got fewer"
+        ):
             cut(video, first, count, tmp_path / "cut.mp4")
 
 

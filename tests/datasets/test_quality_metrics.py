@@ -165,7 +165,9 @@ def test_a_clipped_sine_is_saturated_for_two_thirds():
 
 def test_touching_an_end_once_is_no_saturation():
     triangle = np.abs(np.linspace(-1.0, 1.0, 41))[:, None]
-    assert saturation(triangle, np.zeros(1), np.ones(1)) == 0.0
+    from_end_to_end = np.array([[0.0], [1.0], [0.0], [0.5]])
+    for action in (triangle, from_end_to_end):
+        assert saturation(action, np.zeros(1), np.ones(1)) == 0.0
 
 
 def saturation(action, low, high):

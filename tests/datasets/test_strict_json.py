@@ -50,6 +50,15 @@ def test_plain_json_is_read():
     assert parse_json(b"[" * MOST_DEPTH + b"]" * MOST_DEPTH)[0]
 
 
+@pytest.mark.parametrize("name", BAD)
+def test_bad_json_is_refused_whatever_it_should_be(name, tmp_path):
+    with pytest.raises(ValueError, match=r"\A[^\n]{1,300}\Z"):
+        parse_json(BAD[name])
+    (tmp_path / "huge").write_bytes(HUGE)
+    with pytest.raises(ValueError, match="at most 16 MB"):
+        read_json(tmp_path / "huge")
+
+
 def test_a_pipe_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "info.json")
     with pytest.raises(OSError, match="found a named pipe"):
@@ -130,6 +139,8 @@ def test_a_type_that_numpy_would_make_room_for_is_not_read(root):
     done = command("--dataset.root", root, name="inspect")
     assert done.returncode in (0, 2)
     assert "Traceback" not in done.stderr
+    with pytest.raises(HandrailError, match=r"\A[^\n]*unknown column[^\n]*'action'[^\n]*\Z"):
+        read_frames(root, 0, ["action"])
 
 
 def test_a_camera_cannot_lead_out_of_the_dataset():

@@ -21,7 +21,7 @@ SUCCESSES = (True, False, True, False, True)
 OUTCOME = {"next.success": Feature("bool"), "next.done": Feature("bool")}
 
 
-def write(root, columns=True, outcome=OUTCOME):
+def write(root, columns=True, outcome=OUTCOME, said=SUCCESSES):
     """Write episodes whose frames say how they ended, and whose lines of metadata may say so too."""
     rng = np.random.default_rng(0)
     with EpisodeWriter.create(
@@ -30,9 +30,9 @@ def write(root, columns=True, outcome=OUTCOME):
         for number, success in enumerate(SUCCESSES):
             for index in range(8):
                 last = index == 7
-                said = {"next.success": last and success, "next.done": last}
-                writer.add_frame(frame(rng) | {key: said[key] for key in outcome}, "reach")
-            writer.save_episode({"seed": number} | ({"success": success} if columns else {}))
+                shown = {"next.success": last and success, "next.done": last}
+                writer.add_frame(frame(rng) | {key: shown[key] for key in outcome}, "reach")
+            writer.save_episode({"seed": number} | ({"success": said[number]} if columns else {}))
     return root
 
 
@@ -67,8 +67,9 @@ def test_lerobot_s_tools_lose_the_column_and_not_the_label(edited, tmp_path):
 
 
 def test_an_episode_that_says_so_itself_is_believed(tmp_path):
-    root = write(tmp_path / "set")
-    assert [episode.success for episode in summarize(root)] == list(SUCCESSES)
+    other = [not success for success in SUCCESSES]
+    root = write(tmp_path / "set", said=other)
+    assert [episode.success for episode in summarize(root)] == other
     silent = write(tmp_path / "silent", columns=False)
     assert [episode.success for episode in summarize(silent)] == list(SUCCESSES)
 

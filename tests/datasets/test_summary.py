@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from datasets_helpers import FPS, REPO, ROBOT, record, record_with_lerobot
+from datasets_helpers import FPS, REPO, ROBOT, record_with_lerobot
+from editing_helpers import record_episodes
 
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
@@ -81,10 +82,11 @@ def test_chattering_of_what_was_commanded(tmp_path):
 
 
 def test_without_a_tool_the_configuration_is_judged(tmp_path):
-    root = record(tmp_path / "set", 2)
-    state = read_frames(root, 1)["observation.state"][:, :2].astype(float)  # x, y
-    expected = sparc(np.linalg.norm(np.diff(state, axis=0), axis=1) * FPS, FPS)
-    assert summarize(root)[1].smoothness == pytest.approx(expected, nan_ok=True)
+    root = record_episodes(tmp_path / "set", 2)
+    turned = read_frames(root, 1)["observation.state"][:, 0].astype(float)
+    expected = sparc(np.abs(np.diff(turned)) * FPS, FPS)
+    assert np.isfinite(expected)
+    assert summarize(root)[1].smoothness == pytest.approx(expected)
 
 
 def test_a_dataset_of_lerobot_s_own(tmp_path):

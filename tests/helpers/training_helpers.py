@@ -90,7 +90,7 @@ def refused(config: TrainConfig, words: str) -> None:
     from handrail.policies.imitation.training.training import train
 
     with pytest.raises(HandrailError, match=words):
-        train(config, quiet=True)
+        train(config)
 
 
 def cut(config: TrainConfig, folder: Path) -> TrainConfig:

@@ -3,7 +3,7 @@
 import ast
 from pathlib import Path
 
-FILES = sorted(Path(__file__).parent.parent.rglob("test_*.py"))
+FILES = sorted(Path(__file__).parent.parent.rglob("*.py"))
 
 
 # of named tuples, of stable-baselines3, and of LeRobot: how LeKiwi turns its wheels, how a rollout goes back
@@ -27,7 +27,7 @@ def private_names(tree: ast.Module) -> list[str]:
                 found.append(ast.unparse(node))
             case ast.ImportFrom(names=names):
                 found += [entry.name for entry in names if is_private(entry.name)]
-            case ast.Call(func=ast.Attribute(attr="setattr"), args=arguments):
+            case ast.Call(func=ast.Attribute(attr="setattr" | "delattr" | "object"), args=arguments):
                 said = [str(part.value) for part in arguments[:2] if isinstance(part, ast.Constant)]
                 found += [name for name in said if is_private(name.rpartition(".")[2])]
     return found

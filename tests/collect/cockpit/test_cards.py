@@ -68,7 +68,7 @@ def test_a_stop_between_episodes_is_left_for_the_next_one(served):
         socket.send(said())
         while not cards.hear():
             pass
-        cards.hear(0.0)
+        cards.hear()
         assert heard(served, {Kind.STOP}) == [(Kind.STOP, None)]
         assert not heard(served, {Kind.STOP}, patience=0.1)
 
@@ -95,12 +95,14 @@ def test_a_stop_that_is_said_while_the_server_starts_is_heard(tmp_path, monkeypa
             assert heard(made, {Kind.STOP}) == [(Kind.STOP, None)]
 
 
-def test_a_card_that_nobody_acknowledges_is_shown_again(served):
-    cards = Cards(served)
-    with page(served, "page-number-one") as socket:
+def test_a_card_that_nobody_acknowledges_is_shown_again():
+    with server() as made, page(made, "page-number-one") as socket:
+        cards = Cards(made)
         told(socket, "you")
         for _ in range(2):
             cards.show(CARD)
             told(socket, "card")
             cards.show(CARD)  # at once: not again
-            time.sleep(0.6)
+            with pytest.raises(TimeoutError):
+                told(socket, "card", 0.2)
+            time.sleep(0.4)

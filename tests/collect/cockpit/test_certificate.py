@@ -1,5 +1,6 @@
 """Laws of the certificate: made once, made anew whenever it no longer holds; nobody else reads its key."""
 
+import contextlib
 import datetime
 
 import pytest
@@ -57,9 +58,26 @@ def test_one_that_does_not_hold_is_made_anew(tmp_path, monkeypatch, spoilt):
     assert read(cert).not_valid_after_utc > datetime.datetime.now(datetime.UTC) + datetime.timedelta(days=300)
 
 
-def test_one_for_every_address_names_this_computers(tmp_path):
-    cert, _ = certificate("0.0.0.0", tmp_path)
-    assert "127.0.0.1" in addresses(cert)
+class Asking(contextlib.nullcontext):
+    """Stands in for a socket that is asked for its own address."""
+
+    own = "10.1.2.3"
+
+    def __init__(self, *_):
+        super().__init__(self)
+
+    def connect(self, _):
+        pass
+
+    def getsockname(self):
+        return self.own, 1
+
+
+def test_one_for_every_address_names_this_computers(tmp_path, monkeypatch):
+    monkeypatch.setattr(of_certificate.socket, "socket", Asking)
+    for Asking.own in ("10.1.2.3", "10.1.2.4"):
+        cert, _ = certificate("0.0.0.0", tmp_path)
+        assert addresses(cert) == ["127.0.0.1", Asking.own]
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):

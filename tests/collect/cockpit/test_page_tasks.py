@@ -54,13 +54,12 @@ def check(folder, episodes, device, mode="ee", fewest=None):
         assert np.any(each["teleop.raw"])
 
 
-@pytest.fixture(scope="module")
-def reached(tmp_path_factory):
-    return tmp_path_factory.mktemp("page") / "reach"
+def test_reach_by_keys(new_page, tmp_path):
+    """Who holds the keys for what the page says is left gets there, whatever the hand goes along.
 
-
-def test_reach_by_keys(new_page, reached):
-    """Who holds the keys for what the page says is left gets there, whatever the hand goes along."""
+    The dataset is like any other: it opens in plain LeRobot, replays exactly, and trains.
+    """
+    reached = tmp_path / "reach"
     with recording(reached, "--task", "reach", "--dataset.num_episodes", 5) as (process, address):
         driver = PageDriver(new_page(), address)
         for frame in ("", "", "world", "base", "tool"):
@@ -70,6 +69,7 @@ def test_reach_by_keys(new_page, reached):
             page_tasks.follow_words(driver)
         assert process.wait(60) == 0
     check(reached, 5, "keyboard")
+    check_usable(reached, tmp_path / "policy")
 
 
 @pytest.mark.parametrize(
@@ -96,12 +96,9 @@ def test_who_knows_where_the_box_is_carries_it_with_both_hands(new_page, tmp_pat
     check(tmp_path / "d", episodes, device, "pair", max(1, episodes * 3 // 5))
 
 
-def test_what_was_driven_is_a_dataset_like_any_other(reached, tmp_path):
-    """It opens in plain LeRobot, replays exactly, and trains."""
+def check_usable(reached, policy):
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-    if not reached.is_dir():
-        pytest.skip("nothing was driven before")
     plain = LeRobotDataset("somebody/reach", root=reached)
     assert plain.num_episodes == 5
     assert len(plain) == sum(len(each["action"]) for each in saved(reached))
@@ -113,7 +110,7 @@ def test_what_was_driven_is_a_dataset_like_any_other(reached, tmp_path):
     trained = command(
         reached,
         "--output",
-        tmp_path / "policy",
+        policy,
         *("--steps", 4, "--batch_size", 4, "--device", "cpu"),
         name="train",
     )

@@ -136,6 +136,18 @@ async def test_a_page_that_was_replaced_only_stops(house):
 
 
 @in_house
+async def test_a_page_that_says_too_much_nonsense_is_cut_off(house):
+    page = await house.comes()
+    for _ in range(49):
+        page.say("nonsense")
+    await asyncio.sleep(0.7)
+    assert page.closed is None
+    page.say("nonsense")
+    await asyncio.sleep(0.7)  # in which it may still say STOP
+    assert page.closed == 1008
+
+
+@in_house
 async def test_a_page_comes_back_to_a_full_house(house):
     """Its own place is free for it."""
     for number in range(MOST_PAGES):

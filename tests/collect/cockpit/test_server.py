@@ -53,6 +53,7 @@ def test_a_page_that_watches_moves_nothing_but_may_stop(served):
         second.send(drive(1, axes=[1.0] * 18))
         second.send(json.dumps({"kind": "ask", "what": "mode", "value": "direct"}))
         second.send(json.dumps({"kind": "ask", "what": "stop", "value": False}))
+        assert not heard(served, {Kind.ASK, Kind.DRIVE}, patience=0.3)
         second.send(json.dumps({"kind": "ask", "what": "stop", "value": True}))
         assert [kind for kind, _ in heard(served, {Kind.ASK, Kind.DRIVE, Kind.STOP})] == [Kind.STOP]
         second.send(json.dumps({"kind": "ask", "what": "take", "value": True}))
@@ -130,7 +131,8 @@ def test_too_large_a_message_ends_the_connection(served):
 
 def test_the_door_is_closed_without_the_token(guarded):
     token = guarded.address.split("#")[1]
-    for name in ("link.js", "view.js", "meshes/x.bin", "three.min.js"):
+    guarded.keep("x.bin", b"mesh")
+    for name in ("link.js", "view.js", "meshes/x.bin", "played/x.bin", "three.min.js"):
         assert ask(guarded, f"/{name}")[0] == 403
     assert ask(guarded, "/index.html")[0] == 200
     with pytest.raises(InvalidStatus):
@@ -141,13 +143,24 @@ def test_the_door_is_closed_without_the_token(guarded):
     cookie = headers["set-cookie"].split(";")[0]
     assert status == 200
     assert {"HttpOnly", "Secure", "SameSite=strict"} <= set(headers["set-cookie"].split("; "))
-    assert ask(guarded, "/link.js", Cookie=cookie)[0] == 200
+    for name in ("link.js", "meshes/x.bin", "played/x.bin"):
+        assert ask(guarded, f"/{name}", Cookie=cookie)[0] == 200
     assert ask(guarded, "/../server.py", Cookie=cookie)[0] in (403, 404)
     assert ask(guarded, "/%2e%2e/server.py", Cookie=cookie)[0] in (403, 404)
     with pytest.raises(InvalidStatus):
         page(guarded, cookie=cookie, origin="https://evil.example")
     with page(guarded, cookie=cookie) as socket:
         assert told(socket, "you")["driving"]
+
+
+def test_after_five_wrong_tokens_an_answer_comes_a_second_later():
+    with server(token=True) as made:
+        for _ in range(5):
+            assert ask(made, "/login", b"wrong")[0] == 403
+        begun = time.monotonic()
+        assert ask(made, "/login", b"wrong")[0] == 403
+        assert time.monotonic() - begun >= 1.0
+        assert ask(made, "/login", made.address.split("#")[1].encode())[0] == 200
 
 
 def test_the_token_can_be_asked_for_on_this_computer_too():

@@ -2,6 +2,7 @@
 
 import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -20,6 +21,12 @@ def test_nothing_moves_within_the_dead_zone_and_all_else_the_right_way(shape, ra
 @given(SHAPES, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_farther_is_never_less(shape, one, other):
     assert (shape(one) <= shape(other)) or one > other
+
+
+def test_the_curve_is_that_of_its_equation():
+    """Golden: ((0.6 − 0.2) / 0.8)² = 1/4."""
+    assert StickShape(0.2, 2.0)(0.6) == pytest.approx(0.25)
+    assert StickShape(0.0, 1.0)(-0.3) == pytest.approx(-0.3)
 
 
 @given(SHAPES)

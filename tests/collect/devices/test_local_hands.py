@@ -10,7 +10,6 @@ from driven_person import CONTROLS, FORWARD, Driven
 
 from handrail.collect.devices.control_map import Steered, load_map
 from handrail.collect.devices.spacemouse import SpaceMice
-from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.operators.person.inputs import Ask
 from handrail.controllers.robot.model import load_model
 
@@ -106,12 +105,6 @@ def test_a_pair_is_moved_as_one_hand_and_parted(device):
     driven.main.values[control] = 1.0
     assert driven.act().values[driven.person.meaning.channels.names.index("apart.v")] < 0.0
     assert "apart" in driven.shown()
-
-
-def test_one_silent_device_brakes_both_hands(driven):
-    own(driven, "ee")
-    driven.main.attended = False
-    assert driven.act() is EpisodeEvent.PAUSE
 
 
 FORWARD_CAP = bytes.fromhex("010000a2fe0000")  # y = −350, and it counts backward

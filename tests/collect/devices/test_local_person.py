@@ -10,6 +10,9 @@ from device_players import PlayedTerminal
 from driven_person import CHANNELS, FORWARD, MODEL, START, Driven
 
 from handrail.collect.config import RecordConfig
+from handrail.collect.devices import gamepad, open_devices
+from handrail.collect.devices.device import StickShape
+from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.keyboard import Keyboard
 from handrail.collect.devices.open_devices import open_device
 from handrail.collect.operators.modes import MODES
@@ -116,6 +119,30 @@ def test_keys_beside_a_gamepad_move_nothing():
     driven.begin()
     driven.beside.values["w"] = 1.0
     assert not driven.act().values.any()
+    driven.push()
+    assert driven.act().values.any()
+
+
+def test_a_gamepad_has_the_terminal_s_keys_beside_it(monkeypatch):
+    """They move nothing; the sticks have the shape that is asked for."""
+    opened, shapes = {}, []
+
+    class Reader(DeviceReader):
+        def start(self):
+            opened[self.device.name] = self
+
+    monkeypatch.setattr(open_devices, "DeviceReader", Reader)
+    monkeypatch.setattr(open_devices, "Gamepad", lambda shape: shapes.append(shape) or gamepad.Gamepad(shape))
+    monkeypatch.setattr(open_devices, "has_terminal", lambda: True)
+    teleop = TeleopConfig(dead_zone=0.3, exponent=2.5)
+    config = RecordConfig(task="reach", mode="ee", operator="gamepad", teleop=teleop)
+    env: Any = SimpleNamespace(model=MODEL)
+    open_device(config, env, print, fitting(MODES, 1))
+    assert list(opened) == ["gamepad", "keyboard"]
+    assert opened["gamepad"].controls.moves
+    assert not opened["keyboard"].controls.moves
+    assert opened["keyboard"].controls.actions
+    assert shapes[0] == StickShape(0.3, 2.5)
 
 
 @pytest.mark.parametrize("device", START)

@@ -110,7 +110,7 @@ def test_a_recording_with_a_gamepad(tmp_path, pad, listens):
     driven = np.array(seen["teleop.raw"])[:, 3]
     assert driven.max() == 1.0
     assert driven[0] == 0.0
-    assert len(driven) < 60  # two seconds of driving, not the third one
+    assert np.diff(np.array(seen["wall_clock"])).max() > 0.3  # the pause is a gap
     assert seen["next.done"][-1]
     assert not doctor_fails(folder)
     assert not lint_defects(folder)

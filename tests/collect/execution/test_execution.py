@@ -21,10 +21,11 @@ from execution_helpers import (
 from places import ROOT
 from rich.console import Console
 from shared_helpers import wait_until
+from threadpoolctl import threadpool_limits
 
 from handrail.collect.execution.config import ExecutionConfig, cores
 from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.job import TRIES, Job
+from handrail.collect.execution.job import TRIES, Job, attempt_alone
 from handrail.controllers.errors import HandrailError
 
 RAY = pytest.param("ray", marks=[pytest.mark.slow, pytest.mark.filterwarnings("ignore")])
@@ -120,6 +121,12 @@ def test_every_job_has_one_thread_and_the_workers_are_few(config):
     processes = {process for _, process in found.values()}
     assert os.getpid() not in processes
     assert len(processes) <= 2
+
+
+def test_a_job_beside_others_has_one_thread_though_its_process_has_more():
+    with threadpool_limits(2):
+        assert threads()[0] == 2
+        assert attempt_alone(Job("alone", threads)).value[0] == 1
 
 
 @everywhere

@@ -107,7 +107,7 @@ def motion_goal(focus="hand"):
 def test_a_mode_speaks_only_on_its_channels(name, focus):
     inputs = sticks(MODES[name])
     mask, values = inputs.wanted(motion_goal(focus), state())
-    np.testing.assert_array_equal(mask, inputs.mask(focus))
+    np.testing.assert_array_equal(mask, inputs.channels.mask(*MODES[name].owned(focus, MODEL.hand.name)))
     assert np.any(values[mask])
     np.testing.assert_array_equal(values[~mask], 0.0)
     assert np.all(np.abs(values) <= inputs.full)

@@ -81,7 +81,8 @@ def late(robot, gaps, seeds, seconds, horizon=10):
 @pytest.mark.parametrize("robot", robot_names())
 def test_late_updates_touch_nothing(robot):
     """Beyond what was certified the robot is sent the stop that was certified with it."""
-    late(robot, (0.3, 0.5, 1.0), range(1000, 1003), 5.0)
+    travelled = late(robot, (0.3, 0.5, 1.0), range(1000, 1003), 5.0)
+    assert min(travelled.values()) > 0.07 * load_model(robot).description.world.scale  # 0.15 to 0.28 · scale
 
 
 @pytest.mark.slow

@@ -96,6 +96,6 @@ def test_a_pair_stays_together_while_the_base_drives_a_circle():
 def test_a_robot_with_one_hand_is_refused_in_a_line():
     with pytest.raises(HandrailError, match="task carry_box: expected a robot with 2 hands, got lekiwi"):
         build_env(SessionConfig(task="carry_box", robot="lekiwi"), 20)
-    for name in ("CarryBox", "Fetch", "HandOver", "WideTray"):
+    for name in ("CarryBox", "Fetch", "HandOver", "ReachBoth", "WideTray"):
         with pytest.raises(HandrailError, match="expected a robot with 2 hands, got ridgeback_ur10 with 1"):
             gymnasium.make(f"handrail/{name}-v0").reset(seed=0)

@@ -176,16 +176,20 @@ def test_a_hand_keeps_what_it_holds_though_nobody_has_been_heard(mode):
     env.close()
 
 
-@pytest.mark.parametrize("grippers", [(0.0, 0.0), (math.nan, 0.0)])
-def test_grippers_that_no_robot_has_brake(grippers):
+@pytest.mark.parametrize(
+    ("robot", "grippers"),
+    [("ridgeback_ur10", (0.0, 0.0)), ("tiago_pro", (math.nan, 0.0)), ("tiago_pro", (0.0, math.nan))],
+)
+def test_grippers_that_no_robot_has_brake(robot, grippers):
     """Law: a controller's grippers of another size, or NaN in part, end no episode: the robot brakes."""
-    env = build_env(SessionConfig(task="tray", mode="direct"), 20)
+    env = build_env(SessionConfig(task="tray", mode="direct", robot=robot), 20)
     controller = build_controller(MODES["direct"], env.model, 20)
     loop, ask = EpisodeLoop(env, controller), controller.update
     controller.update = lambda state, intent: replace(ask(state, intent), grippers=grippers)
     loop.begin(0)
+    before = loop.now.info["sent"][env.model.size :].tolist()
     channels = Channels.of(env.model.description)
     values = np.where(channels.mask("joint"), 0.3, 0.0)
     frame = loop.step(Intent(values, channels.mask("joint"), time=loop.now.view.state.time))
-    assert frame.action.tolist() == [0.0] * env.model.size + [1.0]
+    assert frame.action.tolist() == [0.0] * env.model.size + before
     env.close()

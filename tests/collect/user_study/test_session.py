@@ -21,7 +21,7 @@ from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.user_study.conduct import Ending
 from handrail.collect.user_study.config import StudySessionConfig
-from handrail.collect.user_study.design import DEMO_NOTE
+from handrail.collect.user_study.design import DEMO_NOTE, Practice
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import plan, practice_seed, trial_seed
 from handrail.collect.user_study.run import study_session
@@ -90,6 +90,20 @@ def test_practice_lasts_until_enough_successes_in_a_row_and_is_not_recorded(tmp_
     assert [row["number"] for row in table(folder, "practice")] == ["1", "2", "1", "2"]
     strips = [title for title in desk.titles if title.startswith("Practice")]
     assert strips[1].endswith("1 of 2 successes in a row")
+
+
+@pytest.mark.parametrize(
+    ("successes", "over"),
+    [
+        ([True], False),
+        ([True, False, True], False),
+        ([False, True, True], True),
+        ([False] * 4, False),
+        ([False] * 5, True),
+    ],
+)
+def test_practice_is_over_after_successes_in_a_row_or_enough_attempts(successes, over):
+    assert Practice(successes=2, most=5).is_over(successes) is over
 
 
 def test_who_does_not_consent_is_told_so_and_drives_nothing(tmp_path):

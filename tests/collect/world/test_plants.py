@@ -53,8 +53,8 @@ def test_a_stop_ends_at_rest_within_the_limits(build):
     assert robot.send(())[-1] == 1.0  # the gripper stays as it is
 
 
-def test_both_move_alike(build):
-    robot, ideal = build(), IdealRobot(MODEL, Scene(), HOME, STEP)
+def test_both_move_alike():
+    robot, ideal = (kind(MODEL, Scene(), HOME, STEP) for kind in (Simulation, IdealRobot))
     for k in range(40):
         for each in (robot, ideal):
             each.send(AHEAD * np.sin(0.1 * k))

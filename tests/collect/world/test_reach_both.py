@@ -9,7 +9,6 @@ from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, build_session
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.inverse_kinematics import hands_configuration
 
 
@@ -76,8 +75,3 @@ def test_arms_of_five_joints_reach_both(hand):
     outcomes = [session.run(episode_seed(1000, number)) for number in (8, 67, 79)]  # one by one they did not
     assert all(outcome.success for outcome in outcomes)
     assert not any(outcome.contact_onsets for outcome in outcomes)
-
-
-def test_a_robot_with_one_hand_is_refused():
-    with pytest.raises(HandrailError, match="task reach_both: expected a robot with 2 hands, got ridgeback"):
-        build_env(SessionConfig(task="reach_both"), 20)

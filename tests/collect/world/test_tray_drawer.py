@@ -56,6 +56,8 @@ def test_the_task_s_objectives_are_a_condition_of_their_own():
     (mask,) = {np.frombuffer(mask, dtype=bool).sum() for mask in watcher.masks}
     assert mask == 6
     assert outcome.contact_onsets == 0
+    assert outcome.success, outcome
+    assert watcher.tilt < 0.1
 
 
 def test_who_drives_with_a_tray_minds_its_height():

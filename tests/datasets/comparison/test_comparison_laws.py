@@ -100,6 +100,9 @@ def test_frames_of_episodes(most):
     for length, frames in zip(lengths, chosen, strict=True):
         assert len(set(frames)) == len(frames)
         assert set(frames) <= set(range(length))
+        if len(frames) > 1:
+            assert (frames[0], frames[-1]) == (0, length - 1)
+            assert np.ptp(np.diff(frames)) <= 1
 
 
 def test_the_success_that_is_shown_is_the_one_that_is_tested():

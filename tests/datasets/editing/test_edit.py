@@ -100,7 +100,7 @@ def test_idle_ends_are_cut_and_success_is_not(recorded, tmp_path):
     first -= first % 2  # a group of pictures
     assert {row["trimmed_start"] for row in rows} == {first}
     spans = {number: (first, rows[number]["length"]) for number in range(4)}
-    assert all(MOVING <= length < LENGTH - STILL // 2 for _, length in spans.values())
+    assert {length for _, length in spans.values()} == {STILL + MOVING + 1 + 8 - first}  # 0.25 s at 30 Hz
     check(tmp_path / "new", recorded, range(4), ["trimmed_start", "next.done"], spans)
     for number in range(4):
         frames = read_frames(tmp_path / "new", number)
@@ -109,6 +109,9 @@ def test_idle_ends_are_cut_and_success_is_not(recorded, tmp_path):
     edit(f"trim --output {tmp_path / 'again'}", tmp_path / "new")
     again = read_episodes(tmp_path / "again")
     assert [row["length"] for row in again] == [row["length"] for row in rows]
+    edit(f"relabel --episodes 1 --label success --output {tmp_path / 'late'}", recorded)  # its last frame
+    edit("trim --in_place", tmp_path / "late")
+    assert read_episodes(tmp_path / "late")[1]["length"] == LENGTH - first
 
 
 def test_videos_are_copied_not_encoded_anew(recorded, tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from canned import copied, record_by_command
-from command_helpers import command, refused
+from command_helpers import command, ran, refused
 from datasets_helpers import CAMERAS, tree
 from editing_helpers import record_episodes
 from fsspec.implementations.memory import MemoryFileSystem
@@ -158,7 +158,8 @@ def test_the_card_of_a_dataset_without_pictures_opens_with_one(tmp_path, hub):
     assert np.ptp(shown[0]) > 100
     assert (np.abs(shown[-1] - shown[0]).max(axis=2) > 60).sum() > 100  # it moves
     check_whole(root, verify=True)
-    command(root, "--episodes", "0", "--output", tmp_path / "kept", name="edit keep")
+    ran(root, "--episodes", "0", "--output", tmp_path / "kept", name="edit keep")
+    assert (tmp_path / "kept" / "meta" / "info.json").is_file()
     assert not list(tmp_path.glob("kept/**/preview.webp"))
 
 

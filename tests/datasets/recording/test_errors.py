@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from datasets_helpers import (
     create,
     fails,
     frame_of,
+    open_with_lerobot,
     record,
     record_one,
     resume,
@@ -24,6 +26,7 @@ from datasets_helpers import (
 )
 from places import HELPERS
 
+from handrail.datasets.format import video
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature, check_features, check_frame
@@ -163,15 +166,20 @@ def test_whole_numbers_must_fit_and_pictures_must_be_bytes():
     fails(lambda: check_frame({"n": 3, "camera": picture.transpose(2, 0, 1)}, features), "(32, 32, 3)")
 
 
-def test_a_frame_is_copied(tmp_path):
-    root = tmp_path / "set"
+def test_a_frame_is_copied(tmp_path, monkeypatch):
+    """Also pictures that wait for their encoder."""
+    root, may, levels = tmp_path / "set", threading.Event(), video.image_levels
+    monkeypatch.setattr(video, "image_levels", lambda image: (may.wait(10.0), levels(image))[1])
     with create(root, cameras=True) as writer:
         frame = frame_of(0, 0, cameras=True)
         for _ in range(3):
             writer.add_frame(frame, "task")
         frame["action"][:] = 99
         frame[CAMERAS[0]][:] = 0
+        may.set()
         writer.save_episode()
+    shown = open_with_lerobot(root)[2][CAMERAS[0]].mean().item() * 255
+    assert shown == pytest.approx(frame_of(0, 0, cameras=True)[CAMERAS[0]].mean(), abs=2.5)
     assert np.array_equal(read_frames(root, 0)["action"][0], frame_of(0, 0, cameras=False)["action"])
 
 

@@ -21,7 +21,7 @@ from handrail.datasets.recording.repair import repair
 COMMANDS = (
     ("inspect",),
     ("inspect", "--check"),
-    ("pack", "--output", "/nowhere/new"),
+    ("pack", "--output", "{new}"),
     ("repair",),
 )
 
@@ -101,12 +101,18 @@ def test_what_is_no_regular_file_is_one_line_wherever_it_lies(put, tmp_path):
             (copy / name).unlink(missing_ok=True)
             (copy / name).parent.mkdir(exist_ok=True)
             put(copy / name)
-            said = [command(copy, *words, name=verb) for verb, *words in COMMANDS]
+            new = tmp_path / "new"
+            said = [
+                command(copy, *(word.format(new=new) for word in words), name=verb)
+                for verb, *words in COMMANDS
+            ]
+            assert not any("found one in use" in done.stderr for done in said)
             assert all(done.returncode in (0, 1, 2) for done in said)
             assert all(done.stderr.count("\n") <= 1 for done in said), said
             if name.startswith(("data", "videos", "meta/episodes")):
                 assert {done.returncode for done in said[1:]} <= {1, 2}, (name, said)
             shutil.rmtree(copy)
+            shutil.rmtree(new, ignore_errors=True)
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)

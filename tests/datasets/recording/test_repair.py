@@ -75,7 +75,7 @@ def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):
         return  # the byte was one that nothing depends on
     assert checked.returncode == 1
     assert path.relative_to(root).as_posix() in checked.stdout
-    if "but the right frames" in checked.stdout:
+    if stream > 1 and "but the right frames" in checked.stdout:
         return  # it decodes to what was saved: noticed, and no damage
     with pytest.raises(HandrailError, match=r"\A[^\n]*episode 1[^\n]*handrail-edit repair[^\n]*\Z"):
         resume(root, cameras=True)
@@ -190,7 +190,9 @@ def test_lost_lines_of_metadata_never_cost_data(root, asked):
     Layout(root).info.unlink()
     report = repair(root, asked)
     assert report.episodes == (0 if asked else 4)
-    assert all("is missing" in fault for fault in report.damage or report.lost)
+    faults = report.damage or report.lost
+    assert faults
+    assert all("is missing" in fault for fault in faults)
     assert before <= set(tree(root / ".damaged" if asked else root).values())
     assert not report.done[REMOVED]
 

@@ -2,7 +2,7 @@
 
 import json
 from contextlib import closing
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,18 @@ def test_the_base_stays_the_policys(env, settings):
     made.reset(view, np.random.default_rng(0))
     intent: Any = made.act(view)
     assert np.array_equal(intent.mask, channels.mask("ee"))
+
+
+def test_they_help_a_policy_that_gets_no_nearer(env):
+    """After 3 s without progress, as soon as their hand is on the stick."""
+    made, loop = supervisor(env), EpisodeLoop(env, DirectController(env.model, env.period))
+    view = loop.begin(0)
+    made.reset(view, np.random.default_rng(0))
+    helps = []
+    for step in range(120):
+        now: Any = made.act(replace(view, state=replace(view.state, time=step / 20)))
+        helps.append(bool(now.values.any()))
+    assert helps.index(True) / 20 == pytest.approx(3.0 + 0.7, abs=0.2)
 
 
 @pytest.mark.parametrize("mode", ["base", "joints", "switching"])
