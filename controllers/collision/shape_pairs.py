@@ -65,6 +65,7 @@ class ShapePairs:
         self.failure: BaseException | None = None
         self._shape_bounds = dict(_motion_bounds_of(model))
         self._seen: dict[str, tuple[bytes, ...]] = {}
+        self._speeds = np.zeros(len(self._index))  # of each shape in the world [m/s]
         self._bound_motions(range(len(self.names)))
         self.update_scene(obstacles)
 
@@ -94,7 +95,9 @@ class ShapePairs:
         memory.shape_rotation[index] = (frame.rotation @ obstacle.rotation).ravel()
         memory.shape_position[index] = frame.act(np.array(obstacle.position))
         memory.velocity[index] = frame.rotation @ obstacle.velocity
-        memory.speed[self.rows[obstacle.name]] = np.linalg.norm(obstacle.velocity)
+        self._speeds[index] = np.linalg.norm(obstacle.velocity)
+        rows = self.rows[obstacle.name]
+        memory.speed[rows] = self._speeds[memory.first[rows]] + self._speeds[memory.second[rows]]
 
     def _scene_pairs(self, obstacles: tuple[Obstacle, ...]) -> list[tuple[str, str]]:
         """Return the robot with the floor and with what stands around."""
@@ -143,7 +146,12 @@ class ShapePairs:
             found = coal.DistanceResult()
             coal.distance(first, poses[0], second, poses[1], coal.DistanceRequest(), found)
             points = found.getNearestPoint1(), found.getNearestPoint2()
-            np.ctypeslib.as_array(witness, (9,))[:] = np.concatenate([found.normal, *points])
+            said = np.ctypeslib.as_array(witness, (9,))
+            said[:] = np.concatenate([found.normal, *points])
+            if not np.isfinite(said).all():
+                raise HandrailError(
+                    f"distance of {' and '.join(self.names[pair])}: expected numbers, got NaN"
+                )
         except BaseException as error:  # C cannot pass it on
             self.failure = error
             return 1

@@ -29,8 +29,8 @@ def compiled(function: ca.Function) -> ca.Function:
     generator.add(function)
     source = generator.dump()
     digest = hashlib.sha256(f"{compiler} {_FLAGS} {source}".encode()).hexdigest()[:24]
-    library = _folder() / f"{function.name()}-{digest}.so"
     try:
+        library = _folder() / f"{function.name()}-{digest}.so"
         if not library.is_file():
             _build(source, library, compiler)
         return ca.external(function.name(), str(library))
@@ -51,4 +51,4 @@ def _build(source: str, library: Path, compiler: str) -> None:
 
 
 def _folder() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser() / "handrail"
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "handrail"

@@ -22,6 +22,30 @@ def scene(rng):
     return (*standing, Obstacle("held", Shape("box", [0.4, 0.3, 0.4]), [0.02, 0.05, 0.1], turn, frame="tool"))
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_what_is_held_meets_what_moves_whichever_is_told_first(order):
+    """Law: what is known of now says of a moment to come at most the distance then."""
+    q = MODEL.description.home
+    ball = Obstacle(
+        "ball", Shape("sphere", [0.1]), MODEL.pose(q).position + [0, -1.0, 0], velocity=[0, 1.0, 0]
+    )
+    cup = Obstacle("cup", Shape("box", [0.1, 0.1, 0.1]), [0, 0, 0.1], frame="tool")
+    collision = CollisionModel(MODEL, (cup, ball)[::order])
+    now, path, times = collision.values(q[None])[0], np.stack([q, q]), np.array([0.0, 1.0])
+    known = collision.values(path, times, (q, now), np.full(collision.size, 0.25))
+    exact = collision.values(path, times)
+    assert np.all(known <= exact + 1e-9)
+    assert exact[1, collision.pairs.index(("cup", "ball"))] < 0.0
+
+
+def test_a_distance_that_is_no_number_is_an_error(monkeypatch):
+    block = Obstacle("block", Shape("box", [0.6, 0.6, 0.6]), [*MODEL.description.home[:2], 0.5])
+    collision = CollisionModel(MODEL, (block,))
+    monkeypatch.setattr("handrail.controllers.collision.shape_pairs.coal.distance", lambda *_: 0.0)
+    with pytest.raises(HandrailError, match=r"distance of .* and block: expected numbers, got NaN"):
+        collision.values(MODEL.description.home[None])
+
+
 def test_gradients_are_the_derivatives_of_the_distances():
     rng = np.random.default_rng(0)
     collision, h = CollisionModel(MODEL, scene(rng)), 1e-3

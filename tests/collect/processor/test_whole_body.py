@@ -1,0 +1,42 @@
+"""A robot of LeRobot's as a whole body: where it is expected, whatever its odometry says."""
+
+import math
+
+import numpy as np
+import pytest
+
+from handrail.collect.processor.units import robot_units
+from handrail.collect.processor.whole_body import WholeBody
+from handrail.controllers.robot.model import load_model
+
+MODEL = load_model("lekiwi")
+DESCRIPTION = MODEL.description
+TURN = np.append(np.where(np.arange(MODEL.size) == 2, 0.4, 0.0), 0.0)
+
+
+def driven(start, corrected=0.0):
+    """Turn a base with odometry, which is corrected once; return how far off it is expected, (T, 3)."""
+    units = {
+        "joints": {name: {"name": name, "unit": "radians"} for name in DESCRIPTION.arm_joints},
+        "base": {"unit": "radians", "pose": ["px", "py", "ph"]},
+        "gripper": {"name": "g", "opened": 0.0, "closed": 1.0},
+    }
+    body, pose, off = WholeBody(MODEL, robot_units(units, DESCRIPTION), 0.05), np.array([0.0, 0.0, start]), []
+    arm = dict(zip((f"{name}.pos" for name in DESCRIPTION.arm_joints), DESCRIPTION.home[3:], strict=True))
+    for step in range(60):
+        pose[0] += corrected if step == 20 else 0.0
+        said = {"g": 0.0, "px": pose[0], "py": pose[1], "ph": math.remainder(pose[2], 2.0 * math.pi)}
+        state = body.observe(arm | said, 0.05 * (step + 1))
+        away = state.expected[:3] - pose
+        off.append([*away[:2], math.remainder(away[2], 2.0 * math.pi)])
+        body.send(TURN)
+        pose[2] += 0.05 * body.velocity[2]
+    return np.array(off)
+
+
+@pytest.mark.parametrize(("start", "corrected"), [(2.9, 0.0), (-0.5, 1.0), (2.9, -1.0)])
+def test_a_base_is_expected_where_it_is_though_its_heading_wraps_or_its_place_is_corrected(start, corrected):
+    """Law: ±π is one heading, and a correction of odometry is no motion."""
+    usual = driven(-0.5)
+    np.testing.assert_allclose(driven(start, corrected), usual, atol=1e-6)
+    assert np.abs(usual).max() < 0.1
