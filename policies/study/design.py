@@ -191,6 +191,11 @@ class StudyDesign:
         numbered = counted.numbered or (self.modes if counted.same_number else ())
         by_number = (mode for *two, budget in pairs if budget == "number" for mode in two)
         check_known("mode of a pair by number, which same_number has in all draws", by_number, numbered)
+        for name, task in self.tasks.items():
+            told = {f"{size:g}" for size in task.sizes if 0.0 < size < task.minutes}
+            if len(told) < len(task.sizes):
+                words = f"expected each once, between 0 and its {task.minutes:g} minutes"
+                raise HandrailError(f"study {self.name}: sizes of {name}: {words}, got {task.sizes}")
         most = min(task.steps for task in self.tasks.values())
         if any(updates % self.curve[0] or updates >= most for updates in self.curve):
             words = f"expected multiples of the first below {most} updates"
@@ -224,6 +229,8 @@ class StudyDesign:
                 raise HandrailError(f"{where}: expected ways whose names are words, got {way!r}")
         for pair in rounds.primary:
             check_known("way", pair, rounds.ways)
+            if len(set(pair)) < 2 or rounds.primary.count(pair) > 1:
+                raise HandrailError(f"{where}: primary: expected two ways each, once, got {rounds.primary}")
         for task, each in self.tasks.items():
             if not each.round_minutes or each.sizes:
                 found = f"got sizes {each.sizes}" if each.sizes else "found none"

@@ -15,7 +15,7 @@ from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import as_json
 from handrail.policies.imitation.training.presets import resolved
-from handrail.policies.study.design import MOST_DRAWS, StudyDesign, Way
+from handrail.policies.study.design import MIXED, MOST_DRAWS, StudyDesign, Way
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 PRESETS = Path(__file__).parent / "presets"
@@ -181,6 +181,8 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
         before = fingerprint(job.before, design)
         recorded |= _some(config, ("operator", "arbiter"))
         recorded["before"] = {part: before[part] for part in ("recording", "wanted", "training")}
+    if MIXED in cell.mode:  # how much there shall be says when the mode changes
+        recorded["halves"] = wanted(cell, design)
     found = {"recording": recorded, "wanted": wanted(cell, design)}
     if job.policy is None:
         return found

@@ -21,10 +21,12 @@ from handrail.datasets.reading.load import each_opened, recorded_episodes
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
 from handrail.datasets.storage.strict_json import known_json, write_json
-from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
+from handrail.policies.imitation.interface.checkpoint import MODEL, last_checkpoint, read_meta
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import StudyCell, StudyJob, StudyLayout, StudyPolicy
+from handrail.policies.study.progress import has_rollouts
 from handrail.policies.study.settings import (
+    BATCH,
     FPS,
     evaluations,
     fingerprint,
@@ -149,8 +151,9 @@ def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
         from handrail.policies.imitation.evaluation.copilot import share as copilot
     while True:
         rows = read_episodes(root) if root.exists() else []
-        successes = sum(bool(row["success"]) for row in rows)
-        minutes = sum(row["length"] for row in rows) / FPS / 60.0
+        whole = rows[: len(rows) // BATCH * BATCH]  # in a turn that was interrupted nobody looks
+        successes = sum(bool(row["success"]) for row in whole)
+        minutes = sum(row["length"] for row in whole) / FPS / 60.0
         if successes >= need["episodes"] and minutes >= need["minutes"]:
             break
         if len(rows) >= _MOST_ATTEMPTS * need["episodes"] and successes < need["episodes"]:
@@ -184,6 +187,18 @@ def _is_corrected(root: Path) -> bool:
     return any(map(_steered, each_opened(learnt)))
 
 
+def _check_checkpoints(job: StudyJob, policy: StudyPolicy, design: StudyDesign, layout: StudyLayout) -> None:
+    """Remove a trained policy, and how it drove, if an earlier checkpoint that is to drive is gone."""
+    last = last_checkpoint(layout.policy(policy))
+    if last is None or int(last.name) < design.tasks[policy.cell.task].steps:
+        return
+    asked = evaluations(job, design, str(last / MODEL))
+    files = {what: layout.evaluation(policy, what) for what in asked}
+    if any(not (Path(each.policy[0]).is_dir() or has_rollouts(files[w], each)) for w, each in asked.items()):
+        for path in (layout.policy(policy), *files.values()):
+            remove(path)
+
+
 def _train_and_evaluate(
     job: StudyJob, policy: StudyPolicy, design: StudyDesign, layout: StudyLayout
 ) -> dict[str, Any]:
@@ -195,11 +210,14 @@ def _train_and_evaluate(
     config = training(policy, design, root, layout.policy(policy))
     if config.corrections == "weighted" and not _is_corrected(root):
         config = replace(config, corrections="all")
+    _check_checkpoints(job, policy, design, layout)
     folder = train(config)
     remove(layout.merged(policy.cell))
     trained = time.monotonic()
     for what, config in evaluations(job, design, str(folder)).items():
         file = layout.evaluation(policy, what)
+        if has_rollouts(file, config):
+            continue  # its checkpoint may be gone
         file.parent.mkdir(parents=True, exist_ok=True)
         evaluate(replace(config, json=str(file)))
     meta = read_meta(folder)

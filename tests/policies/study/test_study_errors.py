@@ -63,6 +63,8 @@ PAIR = "[[pairs]]\none = 'ee'\nother = 'direct'\n"
             ("rollouts = 40", "rollouts = 40\ncurve = [5, 10]"),
             "curve expected multiples of the first below 10",
         ),
+        (("minutes = 0.1", "minutes = 0.1\nsizes = [0.05, 0.05]"), "sizes of reach: expected each once"),
+        (("minutes = 0.1", "minutes = 0.1\nsizes = [0.1]"), "between 0 and its 0.1 minutes"),
         (('"direct"]', '"direct", "ee_and_psychic"]'), "unknown mode 'psychic'"),
         (("[beside]", "[beside]\nnumbered = ['leader']"), "same_number"),
         (("rollouts = 40", "rollouts = 2000000"), "--episodes: expected a whole number"),

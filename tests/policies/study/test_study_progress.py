@@ -138,6 +138,11 @@ def test_done_means_that_everything_is_there(case, tmp_path, preset):
     assert StudyProgress(design, layout).missing == [name[kind]]
 
 
+def test_more_rollouts_than_are_asked_for_do_no_harm(tmp_path, preset):
+    design, layout, _ = everything(tmp_path, preset)
+    assert StudyProgress(dataclasses.replace(design, robustness=None), layout).missing == []
+
+
 def test_the_report_has_nothing_of_other_settings_and_counts_what_is_missing(tmp_path, preset):
     _, layout, found = everything(tmp_path, preset)
     page = tmp_path / "page.md"

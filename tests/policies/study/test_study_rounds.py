@@ -220,6 +220,7 @@ def test_the_effort_is_of_all_draws_by_the_minute(made):
         (('["base+ee"]', '["base+ee", "ee"]'), "expected one mode and a task"),
         (("round_minutes = 0.05", ""), "expected round_minutes of task reach, found none"),
         (('[["helped", "more"]]', '[["helped", "most"]]'), "unknown way 'most'"),
+        (('[["helped", "more"]]', '[["helped", "helped"]]'), "primary: expected two ways each, once"),
         (("[rounds.ways.more]", '[rounds.ways."../x"]'), r"names are words, got '\.\./x'"),
         (("[rounds]", "[beside]\ndraws = 1\n[rounds]"), "rounds: expected no beside"),
         (("draws = 2", "draws = 2\ncurve = [5]"), "rounds: expected no curve"),
