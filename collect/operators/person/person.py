@@ -75,13 +75,12 @@ class Person:
         self._event: EpisodeEvent | None = None
         self._quits = False  # once the episode that was judged is saved
         self._armed = False  # everything was let go once since the robot had to brake
-        self._begun = False  # somebody has pressed Start in this episode
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
         self.setting = replace(self.setting, axis=-1, switches=0)
         self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.READY
-        self._begun, quits = False, self.between is EpisodeEvent.QUIT
+        quits = self.between is EpisodeEvent.QUIT
         self._event, self._armed, self._quits = EpisodeEvent.QUIT if quits else None, False, False
 
     def take(self, inputs: Input, received: float, round_trip: float = 0.0) -> None:
@@ -110,10 +109,9 @@ class Person:
             case what if what in _EVENTS:
                 self._judge(_EVENTS[what])
             case "stop":
-                released = Phase.PAUSED if self._begun else Phase.READY
-                self.phase, self._armed = (Phase.STOPPED if value else released), False
+                self.phase, self._armed = (Phase.STOPPED if value else Phase.PAUSED), False
             case "start" if self.phase in (Phase.READY, Phase.PAUSED):
-                self.phase, self._armed, self._begun = Phase.DRIVING, False, True
+                self.phase, self._armed = Phase.DRIVING, False
             case "pause" if self.phase in (Phase.DRIVING, Phase.LOST):
                 self.phase = Phase.PAUSED
             case "practice" if self.phase is Phase.READY:
@@ -184,6 +182,6 @@ class Person:
             self._quits = True
         elif event is EpisodeEvent.QUIT and self.phase in (Phase.DRIVING, Phase.LOST):
             self.phase = Phase.PAUSED
-        elif self._begun or event.drops:
+        elif self.phase is not Phase.READY or event.drops:
             self._event = event
             self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.PAUSED

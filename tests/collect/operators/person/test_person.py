@@ -113,13 +113,7 @@ def test_the_operator_ends_an_episode(operator, event):
     assert operator.act(view()) == EpisodeEvent(event)
 
 
-@pytest.mark.parametrize("stops", [(), (True, False), (True,)])
-def test_an_episode_that_has_not_begun_cannot_be_judged(operator, stops):
-    """Whether or not somebody stopped meanwhile; it can be made practice, once the stop is released."""
-    for value in stops:
-        operator.ask(Ask("stop", value))
-    operator.ask(Ask("practice", True))
-    assert operator.practises is (not stops or not stops[-1])
+def test_an_episode_that_has_not_begun_cannot_be_judged(operator):
     operator.ask(Ask("success", True))
     assert operator.act(view()) is EpisodeEvent.PAUSE
 
