@@ -156,10 +156,10 @@ def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
         minutes = sum(row["length"] for row in whole) / FPS / 60.0
         if successes >= need["episodes"] and minutes >= need["minutes"]:
             break
-        if len(rows) >= _MOST_ATTEMPTS * need["episodes"] and successes < need["episodes"]:
+        if len(whole) >= _MOST_ATTEMPTS * need["episodes"] and successes < need["episodes"]:
             raise HandrailError(
                 f"collecting {cell.name}: expected {need['episodes']} successes, "
-                f"got {successes} in {len(rows)} attempts"
+                f"got {successes} in {len(whole)} attempts"
             )
         share = min(minutes / need["minutes"], successes / max(1, need["episodes"]))
         code = record(recording(cell, design, root, len(rows), driver, share), copilot)
