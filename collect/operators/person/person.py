@@ -7,6 +7,7 @@ ready ─ start ─▶ driving ◀─ start ─ paused        stopped: the e-sto
      man let go    ▼  │ let go once ─────────┘
                    lost
 ```
+A stop that is released leads back to `ready` where the episode has not begun yet.
 In every state but `driving` the robot brakes to rest and nothing is recorded.
 """
 
@@ -75,13 +76,15 @@ class Person:
         self._event: EpisodeEvent | None = None
         self._quits = False  # once the episode that was judged is saved
         self._armed = False  # everything was let go once since the robot had to brake
+        self._begun = False  # Start was pressed in this episode
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
         self.setting = replace(self.setting, axis=-1, switches=0)
         self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.READY
         quits = self.between is EpisodeEvent.QUIT
-        self._event, self._armed, self._quits = EpisodeEvent.QUIT if quits else None, False, False
+        self._event, self._quits = EpisodeEvent.QUIT if quits else None, False
+        self._armed = self._begun = False
 
     def take(self, inputs: Input, received: float, round_trip: float = 0.0) -> None:
         """Take where the inputs are now.
@@ -109,12 +112,13 @@ class Person:
             case what if what in _EVENTS:
                 self._judge(_EVENTS[what])
             case "stop":
-                self.phase, self._armed = (Phase.STOPPED if value else Phase.PAUSED), False
+                released = Phase.PAUSED if self._begun else Phase.READY
+                self.phase, self._armed = (Phase.STOPPED if value else released), False
             case "start" if self.phase in (Phase.READY, Phase.PAUSED):
-                self.phase, self._armed = Phase.DRIVING, False
+                self.phase, self._armed, self._begun = Phase.DRIVING, False, True
             case "pause" if self.phase in (Phase.DRIVING, Phase.LOST):
                 self.phase = Phase.PAUSED
-            case "practice" if self.phase is Phase.READY:
+            case "practice" if not self._begun:
                 self.practises = value
             case "mode" if value in self.modes and value != setting.mode.name:
                 self.setting = setting.switched(mode=self.modes[value])
@@ -182,6 +186,6 @@ class Person:
             self._quits = True
         elif event is EpisodeEvent.QUIT and self.phase in (Phase.DRIVING, Phase.LOST):
             self.phase = Phase.PAUSED
-        elif self.phase is not Phase.READY or event.drops:
+        elif self._begun or event.drops:
             self._event = event
             self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.PAUSED

@@ -11,10 +11,13 @@ from handrail.controllers.interrupts import Interrupts
 
 
 class StoppingServer:
-    """Passes on a STOP, and then that the trial has failed."""
+    """Passes on a Start, a STOP, and then that the trial has failed."""
 
     def __init__(self):
-        self.pipe, self.dropped, self.unread = self, Counter(), [(Kind.STOP, None)]
+        self.pipe, self.dropped, self.unread = self, Counter(), [
+            (Kind.ASK, {"what": "start", "value": True}),
+            (Kind.STOP, None),
+        ]
         self.sent = []
 
     def receive(self):

@@ -113,9 +113,23 @@ def test_the_operator_ends_an_episode(operator, event):
     assert operator.act(view()) == EpisodeEvent(event)
 
 
-def test_an_episode_that_has_not_begun_cannot_be_judged(operator):
-    operator.ask(Ask("success", True))
+@pytest.mark.parametrize("stops", [(), (True,), (True, False)], ids=["ready", "stopped", "released"])
+@pytest.mark.parametrize("judged", ["success", "failure"])
+def test_an_episode_that_has_not_begun_cannot_be_judged(operator, stops, judged):
+    for pressed in stops:
+        operator.ask(Ask("stop", pressed))
+    operator.ask(Ask(judged, True))
+    operator.ask(Ask("practice", True))  # can still be chosen
+    drive(operator)
     assert operator.act(view()) is EpisodeEvent.PAUSE
+    assert operator.practises
+    operator.ask(Ask("stop", False))
+    begin(operator)
+    operator.ask(Ask("practice", False))
+    assert operator.practises
+    operator.ask(Ask("stop", True))
+    operator.ask(Ask(judged, True))
+    assert operator.act(view()) == EpisodeEvent(judged)
 
 
 def test_choices_count_as_switches_where_they_change_what_is_owned(operator):
