@@ -87,25 +87,22 @@ class PolicyOperator:
         self._asked, self._state = view.state.time, state
         observed = self._interface.observe(state, around)
         action = np.asarray(self._policy.act(*observed, pictures, self._task))
-        if self._fits(action):
-            intent = self._interface.decode(action, state)
-        else:
-            self.malformed += 1
-            intent = self._unusable
-        return replace(intent, mode=self._mode, time=view.state.time)
+        self.malformed += not self._fits(action)
+        return replace(self._read(action, state), mode=self._mode, time=view.state.time)
 
     def chunk(self) -> list[Intent]:
         """Return what is planned for the periods after the last intent, as meant where the robot was then."""
-        rows = self._policy.planned()
-        usable = [row for row in rows if self._fits(row)]
-        if len(usable) < len(rows) or not len(self._state):
+        if not len(self._state):
             return []
-        decoded = (self._interface.decode(row, self._state) for row in usable)
-        times = self._asked + self._period * np.arange(1, len(usable) + 1)
+        later = [self._read(row, self._state) for row in self._policy.planned()]
         return [
-            replace(each, mode=self._mode, time=float(time))
-            for each, time in zip(decoded, times, strict=True)
+            replace(each, mode=self._mode, time=float(self._asked + self._period * period))
+            for period, each in enumerate(later, start=1)
         ]
+
+    def _read(self, action: FloatArray, state: FloatArray) -> Intent:
+        """Return what an action means; an intent that brakes if it is not finite, or of the wrong size."""
+        return self._interface.decode(action, state) if self._fits(action) else self._unusable
 
     def _fits(self, action: FloatArray) -> bool:
         return action.shape == (len(self._interface.action_names),) and bool(np.all(np.isfinite(action)))

@@ -14,10 +14,8 @@ class StoppingServer:
     """Passes on a Start, a STOP, and then that the trial has failed."""
 
     def __init__(self):
-        self.pipe, self.dropped, self.unread = self, Counter(), [
-            (Kind.ASK, {"what": "start", "value": True}),
-            (Kind.STOP, None),
-        ]
+        start = (Kind.ASK, {"what": "start", "value": True})
+        self.pipe, self.dropped, self.unread = self, Counter(), [start, (Kind.STOP, None)]
         self.sent = []
 
     def receive(self):
