@@ -1,6 +1,7 @@
 """What a trained policy says of later is used now: one bad row of its plan brakes, as a bad action does."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ class Plans:
         return self.rows
 
 
-def shared(policy):
+def shared(policy) -> Any:
     """Return a person who rests beside a policy whose action is the hand's six numbers and the gripper."""
     names = channels_of(ONE).names[3:9]
     interface = SimpleNamespace(
