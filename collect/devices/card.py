@@ -41,7 +41,7 @@ class Card:
     """Of the device, in force now."""
     trouble: str = ""
     """With a device, and what to do."""
-    grips: Sequence[bool] = (False,)
+    grips: Sequence[float] = (0.0,)
     """Which grippers shall be closed, one a hand."""
     apart: float | None = None
     """How far a leader arm stands from the robot's arm, at most [rad]; none without a leader."""
@@ -69,7 +69,7 @@ class Card:
             chosen.append(f"active hand {setting.hand}")
         chosen.append(f"speed {setting.speed:.0%}")
         for hand, closed in zip(meaning.hands, self.grips, strict=True):
-            chosen.append(f"{hand} gripper {'closed' if closed else 'open'}".strip())
+            chosen.append(f"{hand} gripper {'closed' if closed > 0.5 else 'open'}".strip())
         chosen += [] if self.apart is None else [f"leader {np.degrees(self.apart):.0f}° from the arm"]
         left = max(0.0, self.horizon - view.state.time)
         return (

@@ -76,7 +76,7 @@ class LocalPerson:
         self._sources = [main, beside] if beside else [main]
         self._moving = self._sources[-1] if follower else main  # the one with the dead-man
         self._card = Card(person, main.device.name, [source.controls for source in self._sources])
-        self._grips = [False] * len(person.meaning.hands)
+        self._handle: bool | None = None  # whether a leader's is closed, once it has said so
 
     def __rich__(self) -> RenderableType:
         """Return what the terminal shows."""
@@ -88,14 +88,14 @@ class LocalPerson:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
-        self._grips, self._card.brakes = [False] * len(self._grips), ""
+        self._handle, self._card.brakes = None, ""
         self.person.reset(view, rng)
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
         self._take(*self._heard(), view)
         answer, card = self.person.act(view), self._card
-        card.view, card.moves, card.grips = view, self._moving.moves(self._steered), tuple(self._grips)
+        card.view, card.moves, card.grips = view, self._moving.moves(self._steered), tuple(self.person.closed)
         return answer
 
     def between(self) -> EpisodeEvent | None:
@@ -152,7 +152,9 @@ class LocalPerson:
         if self._follower:
             clutch = on and CLUTCH in other.deflections
             targets = self._follower.targets(main.joints, clutch, view.state.q)
-            self._grips[0] = self._follower.grips(main.joints, self._grips[0])
+            before, self._handle = self._handle, self._follower.grips(main.joints, bool(self._handle))
+            if before not in (None, self._handle):
+                self.person.grip(0, self._handle)
             self._card.apart = self._follower.apart(main.joints, view.state.q)
         else:
             on = on and HOLD in main.deflections
@@ -163,7 +165,7 @@ class LocalPerson:
             name = f"{parts[part]}.{way}" if part in parts else axis
             said[name] = said.get(name, 0.0) + value
         axes = tuple(float(np.clip(said.get(name, 0.0), -1.0, 1.0)) for name in names)
-        inputs = Input(on, self._main.device.name, tuple(self._grips), axes, 0.0, targets)
+        inputs = Input(on, self._main.device.name, (False,) * len(self.person.closed), axes, 0.0, targets)
         self.person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
 
     def _do(self, action: str) -> None:
@@ -171,7 +173,7 @@ class LocalPerson:
         hands = self.person.meaning.hands
         grips = {"grip": hands.index(self.person.setting.hand), "grip_left": 0, "grip_right": len(hands) - 1}
         if action in grips:
-            self._grips[grips[action]] ^= True
+            self.person.grip(grips[action], not self.person.closed[grips[action]] > 0.5)
         elif action == "help":
             self._card.is_helping = not self._card.is_helping
         elif action == "focus" and not self._main.next_bank(self._steered):

@@ -21,6 +21,8 @@ class View:
     task: TaskState  # the truth of this moment
     observation: Mapping[str, Any] = field(default_factory=dict)
     """What is recorded of it: `agent_pos`, `environment_state`, and `pixels` by camera."""
+    grippers: tuple[float, ...] = ()
+    """What each gripper was told last: 0 open to 1 closed."""
 
     @property
     def tool(self) -> Pose:

@@ -8,7 +8,7 @@ step(intent) ─▶ controller ─ command ─▶ env.step ─▶ robot.send ─
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
@@ -22,6 +22,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.usual_frames import in_usual_frames
 from handrail.controllers.robot.model import Pose
 from handrail.datasets.recording.frames import Frame
 
@@ -131,7 +132,7 @@ class EpisodeLoop:
         observation, info = self.env.reset(seed=seed)
         self._controller.reset(self.env.plant.obstacles())
         tally = Tally(seed or 0, self.env.period)
-        self.now = Moment(observation, info, tally, self._view(observation), self._holds)
+        self.now = Moment(observation, info, tally, self._view(observation, info), self._holds)
         for disturbance in self._disturbances:
             disturbance.begin(self.env, seed or 0)
         return self.now.view
@@ -139,7 +140,7 @@ class EpisodeLoop:
     def look(self) -> View:
         """Return the robot and its world as they are now; the next step acts on that."""
         self.now.looked = self.tally.elapsed
-        self.now.view = self._view(self.now.observation)
+        self.now.view = self._view(self.now.observation, self.now.info)
         return self.now.view
 
     def step(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> Frame:
@@ -172,7 +173,7 @@ class EpisodeLoop:
             state=seen["agent_pos"],
             environment=seen["environment_state"],
             images=seen.get("pixels", {}),
-            intent=intent,
+            intent=in_usual_frames(intent, env.model, now.view.state.q) or intent,
             action=now.info["sent"],
             command=action.astype(np.float32),
             diagnostics=now.command.diagnostics,
@@ -239,6 +240,7 @@ class EpisodeLoop:
     def _holds(self) -> bool:
         return bool(self.env.plant.held())
 
-    def _view(self, observation: Observation) -> View:
+    def _view(self, observation: Observation, info: Mapping[str, Any]) -> View:
         env = self.env
-        return View(*((env.state(), env.task_state()) if env.real else env.seen), observation)
+        seen = (env.state(), env.task_state()) if env.real else env.seen
+        return View(*seen, observation, tuple(info["sent"][env.model.size :].tolist()))

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import fsspec
 import numpy as np
-from huggingface_hub.errors import HfHubHTTPError
+from huggingface_hub import HfApi
 
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.regular_file import regular
@@ -103,7 +103,7 @@ def prepare(
             write_whole(root / PREVIEW, picture)
     said = _write_card(root, repo_id, license_id)
     names = [path.relative_to(root).as_posix() for path in sorted(root.rglob("*")) if path.is_file()]
-    files = [name for name in names if any(fnmatch(name, pattern) for pattern in SENT) and name[0] != "."]
+    files = [name for name in names if _goes(name)]
     home = os.path.realpath(root)
     if linked := [name for name in files if os.path.realpath(root / name) != os.path.join(home, name)]:
         raise HandrailError(
@@ -120,6 +120,7 @@ def upload(push: Upload) -> None:
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     try:
+        _check_hub(push)
         LeRobotDataset(push.repo_id, root=push.root).push_to_hub(
             tags=list(TAGS),
             license=push.license_id,
@@ -127,7 +128,9 @@ def upload(push: Upload) -> None:
             allow_patterns=list(SENT),
             dataset_description=push.description,
         )
-    except (OSError, ValueError, RuntimeError, HfHubHTTPError) as error:
+    except HandrailError:
+        raise
+    except Exception as error:  # of the hub's client and the network
         said = message_of(error).partition("\n")[0]
         raise HandrailError(f"--upload: the hub did not take {push.repo_id}: {said}") from error
 
@@ -182,6 +185,27 @@ def _check_nobody(root: Path) -> None:
             f"dataset {str(root)!r}: people drove episodes {_few(unknown)}, and another tool has dropped who,"
             " so they may be of participants of a user study; send the dataset that Handrail recorded"
         )
+
+
+def _check_hub(push: Upload) -> None:
+    """Check that what is on the hub under this name is as private as asked, and no larger."""
+    hub = HfApi()
+    if not hub.repo_exists(push.repo_id, repo_type="dataset"):
+        return
+    if push.private and not hub.repo_info(push.repo_id, repo_type="dataset").private:
+        raise HandrailError(
+            f"--upload: {push.repo_id} is on the hub and public: say --no_private, or make it private there"
+        )
+    there = {name for name in hub.list_repo_files(push.repo_id, repo_type="dataset") if _goes(name)}
+    if stale := sorted(there - set(push.files)):
+        raise HandrailError(
+            f"--upload: {push.repo_id} on the hub has {len(stale)} files that this dataset has not, such as"
+            f" {stale[0]}; LeRobot would read them as episodes: delete them there, or choose another name"
+        )
+
+
+def _goes(name: str) -> bool:
+    return any(fnmatch(name, pattern) for pattern in SENT) and name[0] != "."
 
 
 def _few(numbers: Sequence[int]) -> str:

@@ -180,8 +180,8 @@ class Demonstration(Episode):
     def inputs(self) -> FloatArray:
         """What the operator put in, zero on axes not owned and without the gripper, `(N, u)`."""
         values = self.matrix("asked")
-        owned = self.matrix("owned") if self.has("owned") else np.empty(0)
-        if owned.shape == values.shape:
+        owned = self.matrix("owned")[:, : values.shape[1]] if self.has("owned") else np.empty(0)
+        if owned.shape == values.shape:  # those of the grippers come after the channels
             values = np.where(owned.astype(bool), values, 0.0)
         axes = self.entries("asked") or map(str, range(values.shape[1]))
         return values[:, [place for place, name in enumerate(axes) if "gripper" not in name]]

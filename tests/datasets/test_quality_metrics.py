@@ -208,6 +208,11 @@ def test_effort():
     assert steered(effort.input_reversals, inputs, scale) == 0.0
 
 
+def test_what_is_not_owned_is_no_input_where_the_mask_has_the_grippers_too():
+    inputs, owned = np.ones((20, 2)), np.tile([True, False, True], (20, 1))
+    assert value(effort.active_axes, {"input_scale": np.ones(2)}, asked=inputs, owned=owned) == 1.0
+
+
 def test_reversals_pass_over_the_dead_band():
     axis = np.array([1.0, 0.0, 1.0, -1.0, 0.01, -1.0, -0.01, 1.0])[:, None]
     assert steered(effort.input_reversals, axis, np.ones(1)) == 2.0

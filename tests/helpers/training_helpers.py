@@ -60,15 +60,21 @@ def write_dataset(
     successes: Sequence[bool] = (),
     cameras: Sequence[str] = (),
     limits: Sequence[float] = (),
+    driven: Sequence[str] = (),
 ) -> Path:
-    """Write episodes of random numbers; modes, successes and time limits as given, else `ee` and success."""
+    """Write episodes of random numbers; modes, successes and time limits as given, else `ee` and success.
+
+    `driven`: the mode that a last frame of each episode names.
+    """
     rng = np.random.default_rng(0)
+    named = {"teleop.mode": Feature("string", (1,))} if driven else {}
     with EpisodeWriter.create(
-        root, Manifest("handrail/test", FPS, "ridgeback_ur10", features(cameras))
+        root, Manifest("handrail/test", FPS, "ridgeback_ur10", features(cameras) | named)
     ) as writer:
         for number, length in enumerate(lengths):
-            for _ in range(length):
-                writer.add_frame(frame(rng, cameras), "reach")
+            for index in range(length):
+                said = {"teleop.mode": driven[number] if index == length - 1 else ""} if driven else {}
+                writer.add_frame(frame(rng, cameras) | said, "reach")
             mode = modes[number] if modes else "ee"
             success = successes[number] if successes else True
             row = {"environment": "reach", "mode": mode, "success": success, "seed": number}

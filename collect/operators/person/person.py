@@ -56,6 +56,7 @@ class Person:
         inputs: the newest.
         received: when they came [s].
         round_trip: of the frame that they answer [s].
+        closed: how far each gripper shall be, 0 open to 1 closed: as it is until it is changed.
     """
 
     def __init__(
@@ -72,6 +73,8 @@ class Person:
         self.setting, self.phase = Setting(modes[first], hand=model.hand.name), Phase.READY
         self.inputs: Input | None = None
         self.received = self.round_trip = 0.0
+        self._grips: tuple[bool, ...] = ()  # the device's, as it said last: a change changes a gripper
+        self._undone = False
         self.practises = False
         self._event: EpisodeEvent | None = None
         self._quits = False  # once the episode that was judged is saved
@@ -85,6 +88,7 @@ class Person:
         quits = self.between is EpisodeEvent.QUIT
         self._event, self._quits = EpisodeEvent.QUIT if quits else None, False
         self._armed = self._begun = False
+        self._find(view)
 
     def take(self, inputs: Input, received: float, round_trip: float = 0.0) -> None:
         """Take where the inputs are now.
@@ -96,14 +100,22 @@ class Person:
         """
         if not self.meaning.fits(inputs):
             return
+        for hand, (now, before) in enumerate(zip(inputs.grips, self._grips, strict=False)):
+            if now != before:
+                self.grip(hand, not self.closed[hand] > 0.5)
+        self._grips = inputs.grips
         self.inputs, self.received, self.round_trip = inputs, received, round_trip
         self._armed |= inputs.on and inputs.is_let_go
 
     def lose(self) -> None:
         """Take note that nobody drives any more: whoever comes next has to press Start."""
-        self.inputs = None
+        self.inputs, self._grips = None, ()
         if self.phase in (Phase.DRIVING, Phase.LOST):
             self.phase = Phase.PAUSED
+
+    def grip(self, hand: int, closed: bool) -> None:
+        """Close or open a gripper."""
+        self.closed[hand] = float(closed)
 
     def ask(self, ask: Ask) -> None:
         """Do what the operator asks for; what makes no sense now is left undone."""
@@ -140,8 +152,11 @@ class Person:
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
+        if self._undone:
+            self._find(view)
         if self._event is not None:
             event, self._event = self._event, None
+            self._undone = event is EpisodeEvent.UNDO
             return event
         driven = self._is_driven()
         if self.phase is Phase.DRIVING and not driven:
@@ -153,7 +168,8 @@ class Person:
         inputs = self.inputs if self._armed else self.inputs.let_go()
         if self.setting.is_single:
             self._pick_axis(inputs)
-        return self.meaning.intent(inputs, self.setting, view.state, self.age, self.round_trip)
+        intent = self.meaning.intent(inputs, self.setting, view.state, self.age, self.round_trip)
+        return replace(intent, grippers=tuple(self.closed))
 
     @property
     def between(self) -> EpisodeEvent | None:
@@ -166,6 +182,11 @@ class Person:
     def age(self) -> float:
         """Of the newest input [s]."""
         return self._clock() - self.received if self.inputs else np.inf
+
+    def _find(self, view: View) -> None:
+        """Take the grippers as they are."""
+        self.closed, self._grips = list(view.grippers or [0.0] * len(self.meaning.hands)), ()
+        self._undone = False
 
     def _is_driven(self) -> bool:
         return self.inputs is not None and self.inputs.on and self.age <= DEAD_MAN_TIME

@@ -61,18 +61,20 @@ class SharedOperator:
         self._person.reset(view, rng)
         self._policy.reset(view, rng.spawn(1)[0])  # what the person draws is as without a policy
         self._arbiter.reset()
-        self._closed = [0.0] * self._hands  # how far each gripper is asked to be closed
-        self._level: tuple[float, ...] = ()  # of each as the person's device says
+        self._find(view)
         self._changed = [-np.inf] * self._hands  # when the person changed each [s]
         self._held = np.zeros(self._channels.size, dtype=bool)  # what the policy gave up, or shares
-        self._waits = False
+        self._waits = self._undone = False
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return both wishes as one intent, or what the person says of the episode."""
         asked = self._person.act(view)
         if isinstance(asked, EpisodeEvent):
-            self._waits = True
+            self._waits, self._undone = True, self._undone or asked is EpisodeEvent.UNDO
             return asked
+        if self._undone:
+            self._find(view)
+            self._undone = False
         if self._waits:
             self._policy.replan()
             self._waits = False
@@ -86,6 +88,11 @@ class SharedOperator:
             self._take_grippers(asked, self._held, view.state.time)
             return replace(asked, grippers=tuple(self._closed))
         return self._merged(person, *wanted, view)
+
+    def _find(self, view: View) -> None:
+        """Take the grippers as they are."""
+        self._closed = list(view.grippers or [0.0] * self._hands)  # how far each is asked to be closed
+        self._level: tuple[float, ...] = ()  # of each as the person's device says
 
     def _makes_sense(self, intent: Intent) -> bool:
         fits = intent.values.shape == (self._channels.size,)

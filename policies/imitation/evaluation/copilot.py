@@ -73,6 +73,7 @@ def _check_fits(checkpoint: Checkpoint, config: RecordConfig, env: HandrailEnv) 
         ("--robot", meta.robot, config.robot),
         ("--robot_fps" if config.robot_fps else "--dataset.fps", meta.fps, env.fps),
         ("--hand", meta.hand or env.model.hand.name, env.model.hand.name),
+        ("--moving_obstacles", checkpoint.movers, config.moving_obstacles),
     ):
         if own != here:
             raise HandrailError(f"{where}: expected {name} {own}, as it was trained, got {here}")

@@ -38,7 +38,8 @@ class PolicyOperator:
     """Lets a policy steer; an operator.
 
     An action of another size, or one that is not finite, becomes an intent that no controller accepts: the
-    robot brakes. What was planned for moments at which nobody asked is left out.
+    robot brakes. What was planned for moments at which nobody asked is left out; while the robot's clock
+    stands still, as where nobody hears it, the policy does, too.
 
     Args:
         policy: whoever was trained.
@@ -73,10 +74,12 @@ class PolicyOperator:
     def replan(self) -> None:
         """Forget what is planned; what was seen is remembered."""
         self._policy.reset()
-        self._asked, self._state = np.inf, np.zeros(0)
+        self._asked, self._state = np.inf, np.zeros(0)  # nothing was answered yet
 
     def act(self, view: View) -> Intent:
         """Return the intent now."""
+        if self._period and view.state.time == self._asked:
+            return self._said
         seen = view.observation
         state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
         if encoder := self._policy.encoder:
@@ -88,7 +91,8 @@ class PolicyOperator:
         observed = self._interface.observe(state, around)
         action = np.asarray(self._policy.act(*observed, pictures, self._task))
         self.malformed += not self._fits(action)
-        return replace(self._read(action, state), mode=self._mode, time=view.state.time)
+        self._said = replace(self._read(action, state), mode=self._mode, time=view.state.time)
+        return self._said
 
     def chunk(self) -> list[Intent]:
         """Return what is planned for the periods after the last intent, as meant where the robot was then."""

@@ -25,6 +25,8 @@ from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT,
 from handrail.policies.imitation.interface.steps import without_steps
 from handrail.policies.imitation.interface.trust import WEIGHTS, check_policy_folder, registered_policies
 
+_FETCHED = "pretrained_backbone_weights"
+
 
 @dataclass(frozen=True)
 class TrainedPolicy:
@@ -69,17 +71,13 @@ class TrainedPolicy:
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
             batch[PICTURE + camera] = pixels[None].float() / 255.0
         batch["task"] = [task]
-        try:
-            with torch.inference_mode():
-                return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
-        except Exception as error:  # of LeRobot and all below it
-            kind = self.policy.config.type
-            raise HandrailError(f"policy {kind}: cannot act: {message_of(error)}") from error
+        with self._explained(), torch.inference_mode():
+            return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
 
     def planned(self) -> FloatArray:
         """Return the actions that are planned beyond the last one, (K, a) float32; none of other kinds."""
         rows = list(self._queue)
-        with torch.inference_mode():
+        with self._explained(), torch.inference_mode():
             return self.after(torch.cat(rows)).cpu().numpy() if rows else np.zeros((0, 0), np.float32)
 
     def skip(self, count: int) -> None:
@@ -88,6 +86,14 @@ class TrainedPolicy:
             ensembler.reset()
         for _ in range(min(count, len(self._queue))):
             self._queue.popleft()
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:  # of LeRobot and all below it
+            kind = self.policy.config.type
+            raise HandrailError(f"policy {kind}: cannot act: {message_of(error)}") from error
 
     @property
     def _queue(self) -> deque[Any]:
@@ -105,6 +111,8 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
     meta = read_meta(place) if (place / NAME).is_file() else None
     settings = check_policy_folder(place)
     kind, override = settings.pop("type"), {"device_processor": {"device": "cpu"}}
+    if _FETCHED in settings:  # PyTorch would fetch these first; the checkpoint has others
+        settings[_FETCHED] = None
     try:
         config = draccus.decode(registered_policies()[kind], settings | {"device": "cpu"})
         policy = get_policy_class(kind).from_pretrained(place, config=config, strict=True)

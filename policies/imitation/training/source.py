@@ -51,6 +51,7 @@ _LEARNT = ("observation", "action", "next.")
 _CORRECTED = "corrected"  # a column of whether a frame counts as a correction
 _READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
 _READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
+_MODE = "teleop.mode"
 _FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
 _RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
@@ -193,7 +194,7 @@ def _interpreted(
 ) -> tuple[PolicyInterface, Features, Columns]:
     """Return what a policy learns through an interface."""
     if actions == "intent":
-        _check_one_mode(selection, config.mode)
+        _check_one_mode(info, selection, config.mode)
     features = dict(info.features)
     if encoder and ENVIRONMENT not in features:
         names = encoder.reads.interface.environment_names
@@ -230,9 +231,12 @@ def _encoded(
         yield episode | {ENVIRONMENT: said}
 
 
-def _check_one_mode(selection: Selection, said: str) -> None:
+def _check_one_mode(info: DatasetInfo, selection: Selection, said: str) -> None:
     """Check that an intent can be completed when the policy drives: as in its mode, and there is but one."""
     modes = {str(row.get("mode") or "") for row in selection.rows}
+    if _MODE in info.features:  # people may change it while they drive
+        driven = [set(episode[_MODE]) - {""} for episode in _episodes(info, selection, [_MODE])]
+        modes = modes.union(*driven)
     if len(modes) > 1 or not modes <= {*MODES, said} - {""}:
         words = "expected episodes of one teleop mode, whose controller completes the intent"
         found = ", ".join(sorted(mode or "no mode" for mode in modes))

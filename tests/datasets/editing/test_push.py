@@ -9,9 +9,10 @@ import pytest
 import yaml
 from canned import copied, record_by_command
 from command_helpers import command, ran, refused
-from datasets_helpers import CAMERAS, tree
+from datasets_helpers import CAMERAS
 from editing_helpers import record_episodes
 from fsspec.implementations.memory import MemoryFileSystem
+from hub_helpers import push
 from PIL import Image, ImageSequence
 
 from handrail.collect.world.gl import missing_graphics
@@ -19,56 +20,6 @@ from handrail.datasets.format.layout import Layout
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import read_episodes
-
-
-class Hub:
-    """Takes what LeRobot's upload hands to the hub's client, at the place where LeRobot imports it."""
-
-    def __init__(self):
-        self.sent, self.calls, self.repo = {}, [], {}
-
-    def __call__(self):
-        return self
-
-    def create_repo(self, **said):
-        self.repo = said
-
-    def upload_folder(self, folder_path, allow_patterns, ignore_patterns, **said):
-        from huggingface_hub.utils import filter_repo_objects
-
-        files = tree(folder_path)
-        chosen = filter_repo_objects(files, allow_patterns=allow_patterns, ignore_patterns=ignore_patterns)
-        self.calls.append(said)
-        self.sent |= {name: files[name] for name in chosen}
-
-    def delete_tag(self, *_, **__):
-        pass
-
-    create_tag = delete_tag
-
-    def push_card(self, card, repo_id, **_):
-        self.sent["README.md"] = str(card).encode()
-
-
-@pytest.fixture
-def hub(monkeypatch):
-    hub = Hub()
-    monkeypatch.setattr("lerobot.datasets.lerobot_dataset.HfApi", hub)
-    monkeypatch.setattr(
-        "huggingface_hub.DatasetCard.push_to_hub", lambda card, **said: hub.push_card(card, **said)
-    )
-    return hub
-
-
-@pytest.fixture
-def root(tmp_path):
-    return copied(tmp_path / "set", record_episodes, 3, cameras=True, mode="ee")
-
-
-def push(root, *words, code=0):
-    done = command(root, "--dataset.repo_id", "me/reach", *words, name="edit push")
-    assert done.returncode == code, done.stderr
-    return done
 
 
 def litter(root):

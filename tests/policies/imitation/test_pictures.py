@@ -1,5 +1,6 @@
 """Policies that see cameras: beside where things are, or in place of it."""
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -35,6 +36,20 @@ def test_a_policy_sees_cameras_where_it_is_asked_to_and_the_scene_unless_it_is_n
         policy.reset()
         acted.append(policy.act(*still(policy), images={"wrist": np.full((16, 16, 3), level, np.uint8)}))
     assert not np.array_equal(*acted)
+
+
+def test_a_policy_is_loaded_without_a_network(tmp_path, monkeypatch):
+    """Whoever trained it began with a network's weights that PyTorch fetches; the checkpoint has its own."""
+    root = canned(write_dataset, lengths=(5, 6), cameras=("wrist",))
+    folder = train(tiny(root, tmp_path / "policy", SMALL, steps=1, images=True))
+    said = json.loads((folder / "config.json").read_text())
+    fetched = said | {"pretrained_backbone_weights": "ResNet18_Weights.IMAGENET1K_V1"}
+    (folder / "config.json").write_text(json.dumps(fetched))
+    monkeypatch.setattr("torch.hub.load_state_dict_from_url", lambda *_, **__: pytest.fail("fetched"))
+    monkeypatch.setattr(
+        "torchvision.models._api.load_state_dict_from_url", lambda *_, **__: pytest.fail("fetched")
+    )
+    assert load_policy(folder)
 
 
 def test_a_policy_sees_the_same_picture_while_it_acts_as_while_it_learnt(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""What a trained policy says of later is used now: one bad row of its plan brakes, as a bad action does."""
+"""A trained policy beside a person: one bad row of its plan brakes; its plan waits for the robot."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -24,12 +24,13 @@ class Plans:
     encoder = None
 
     def __init__(self):
-        self.rows = ROWS
+        self.rows, self.asked = ROWS, 0
 
     def reset(self):
         pass
 
     def act(self, *observation):
+        self.asked += 1
         return ROWS[0]
 
     def planned(self):
@@ -76,3 +77,12 @@ def test_a_row_of_later_that_makes_no_sense_brakes_now(rows):
     assert found.time == LONG_AGO
     policy.rows = ROWS
     assert operator.act(view(PERIOD * 26)).time == pytest.approx(PERIOD * 26)
+
+
+def test_while_the_robot_is_not_heard_the_plan_stands_still():
+    policy = Plans()
+    operator = shared(policy)
+    found = [operator.act(view(time)) for time in (0.05, 0.1, 0.1, 0.1, 0.15)]
+    assert policy.asked == 3
+    times = [each.source(POLICY).predict.times[0] for each in found]
+    assert times == pytest.approx([0.05, 0.1, 0.1, 0.1, 0.15])

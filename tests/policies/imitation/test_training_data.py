@@ -126,6 +126,16 @@ def test_distances_are_not_taken_for_colours(tmp_path):
     refused(config, f"pictures in colour, found distances in {PICTURES}")
 
 
+def test_an_episode_in_which_somebody_changed_the_mode_is_refused(tmp_path):
+    """Its row says the one that it began in; `realised` takes it."""
+    root = canned(write_dataset, driven=("ee", "direct", "ee"))
+    config = {"root": root, "output": tmp_path / "policy", "steps": 1}
+    refused(tiny(**config, actions="intent"), "one teleop mode.*got direct, ee;")
+    assert train(tiny(**config))
+    root = canned(write_dataset, driven=("ee", "ee", "ee"))
+    assert read_meta(train(tiny(**config | {"root": root}, overwrite=True, actions="intent"))).mode == "ee"
+
+
 @pytest.mark.parametrize(
     ("modes", "said"),
     [

@@ -98,8 +98,12 @@ def test_an_episode_says_who_shared_it():
     assert "shared" not in session_columns(RecordConfig())
 
 
-def test_a_policy_of_another_rate_is_refused_by_the_flag_that_was_said(tmp_path):
+def test_a_policy_of_another_rate_or_scene_is_refused_by_the_flag_that_was_said(tmp_path):
     policy = untrained_act(tmp_path / "act", "intent")
-    for flag, rate in (("--robot_fps", "40"), ("--dataset.fps", "40")):
-        told = f"expected {flag} 20, as it was trained, got 40"
-        refused(tmp_path / "set", *WORDS, "--policy", policy, flag, rate, told=told)
+    for flag, said, own in (
+        ("--robot_fps", "40", "20"),
+        ("--dataset.fps", "40", "20"),
+        ("--moving_obstacles", "2", "0"),
+    ):
+        told = f"expected {flag} {own}, as it was trained, got {said}"
+        refused(tmp_path / "set", *WORDS, "--policy", policy, flag, said, told=told)
