@@ -1,6 +1,7 @@
 """A SpaceMouse (3Dconnexion), through hidapi: six axes that spring back, and buttons."""
 
 import struct
+import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -62,6 +63,7 @@ class SpaceMouse:
                 f"SpaceMouse: {where} may not be read; put the line {_RULE} "
                 "into /etc/udev/rules.d/70-spacemouse.rules, plug it in again"
             ) from error
+        self._hid.set_nonblocking(1)  # or a patience of 0 would wait for the next report
 
     def read(self) -> DeviceInput:
         """Return its axes and buttons."""
@@ -139,7 +141,8 @@ class SpaceMice:
 
 def _plugged() -> tuple[Any, list[bytes]]:
     """Return hidapi, and the addresses of those that are plugged in."""
-    hid = imported("hid", "--operator spacemouse", "hidapi", "devices")
+    module = "hidraw" if sys.platform == "linux" else "hid"  # on Linux `hid` is libusb: the rule cannot help
+    hid = imported(module, "--operator spacemouse", "hidapi", "devices")
     return hid, sorted({each["path"] for each in hid.enumerate() if _is_one(each)})
 
 

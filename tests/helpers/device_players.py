@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.gamepad import AXES, BUTTONS
 
+HID = "hidraw" if sys.platform == "linux" else "hid"  # the module that the SpaceMouse is read with
 EVENTS = ROOT / "tests" / "data" / "devices"
 
 
@@ -74,7 +76,7 @@ class PlayedHid:
 
     def __init__(self) -> None:
         self.reports: list[bytes] = []
-        self.plugged, self.allowed = True, True
+        self.plugged, self.allowed, self.waits = True, True, True
         self.vendor, self.product = 0x256F, 0xC635
 
     def enumerate(self) -> list[dict[str, Any]]:
@@ -96,7 +98,11 @@ class PlayedHid:
         if not self.allowed:
             raise OSError("open failed")
 
+    def set_nonblocking(self, on: int) -> None:
+        self.waits = not on
+
     def read(self, size: int, patience: int) -> list[int]:
+        assert patience or not self.waits, "hidapi would wait for the next report, however long"
         if not self.plugged:
             raise OSError("read error")
         return list(self.reports.pop(0)) if self.reports else []

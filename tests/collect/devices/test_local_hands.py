@@ -5,7 +5,7 @@ from copy import copy
 
 import numpy as np
 import pytest
-from device_players import PlayedHid
+from device_players import HID, PlayedHid
 from driven_person import CONTROLS, FORWARD, Driven
 
 from handrail.collect.devices.control_map import Steered, load_map
@@ -124,7 +124,7 @@ class TwoHids:
         return copy(self)
 
     def open_path(self, path):
-        self.read = self.caps[path].read
+        self.read, self.set_nonblocking = self.caps[path].read, self.caps[path].set_nonblocking
 
     def close(self):
         pass
@@ -133,7 +133,7 @@ class TwoHids:
 @pytest.fixture
 def mice(monkeypatch, clock):
     module = TwoHids()
-    monkeypatch.setitem(sys.modules, "hid", module)
+    monkeypatch.setitem(sys.modules, HID, module)
     made = SpaceMice(clock=clock)
     made.open()
     return made, list(module.caps.values())

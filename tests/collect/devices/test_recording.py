@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_helpers import command, refused
-from device_players import PlayedHid, recorded
+from device_players import HID, PlayedHid, recorded
 from judges import doctor_fails, lint_defects
 from played_leader import CALIBRATION, PLAYED
 from terminal_player import TerminalPlayer
@@ -167,7 +167,7 @@ def test_a_recording_with_a_leader_arm_and_a_gamepad(tmp_path, pad, listens, mon
 def test_what_cannot_be_is_one_line_and_nothing_is_written(tmp_path, monkeypatch, flags, said):
     hid = PlayedHid()
     hid.plugged = False
-    monkeypatch.setitem(sys.modules, "hid", hid)
+    monkeypatch.setitem(sys.modules, HID, hid)
     monkeypatch.setattr(sys, "stdin", io.StringIO())
     for name in MULTIPLEXERS:
         monkeypatch.delenv(name, raising=False)
@@ -179,7 +179,7 @@ def test_a_spacemouse_with_a_button_to_hold_may_be_beside_a_policy(tmp_path, mon
     """It comes as far as the plug: a person's own dead-man will do."""
     hid = PlayedHid()
     hid.plugged = False
-    monkeypatch.setitem(sys.modules, "hid", hid)
+    monkeypatch.setitem(sys.modules, HID, hid)
     (tmp_path / "mine.toml").write_text('[actions]\nbutton_1 = "hold"\n')
     words = ("--operator", "spacemouse", *BESIDE, "--teleop.map", tmp_path / "mine.toml")
     refused(tmp_path / "dataset", "--task", "reach", *words, told="SpaceMouse: expected one, found none")

@@ -3,7 +3,7 @@
 import sys
 
 import pytest
-from device_players import PlayedHid, recorded
+from device_players import HID, PlayedHid, recorded
 
 from handrail.collect.devices.spacemouse import SpaceMouse
 from handrail.controllers.errors import HandrailError
@@ -14,7 +14,7 @@ FORWARD = bytes.fromhex("010000a2fe0000")  # y = −350, and it counts backward
 @pytest.fixture
 def played(monkeypatch):
     made = PlayedHid()
-    monkeypatch.setitem(sys.modules, "hid", made)
+    monkeypatch.setitem(sys.modules, HID, made)
     return made
 
 
@@ -108,7 +108,23 @@ def test_an_older_one_of_another_vendor_is_known_and_its_mice_are_not(played):
         SpaceMouse().open()
 
 
+def test_what_has_come_is_read_without_waiting_for_more(played, mouse):
+    """hidapi takes a patience of 0 for none given: unless told otherwise, it waits for the next report."""
+    played.reports = [FORWARD]
+    assert mouse.read().deflections == {"x": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("system", "module", "other"), [("linux", "hidraw", "hid"), ("darwin", "hid", "hidraw")]
+)
+def test_on_linux_it_is_read_by_hidraw_whose_files_the_rule_opens(monkeypatch, system, module, other):
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setitem(sys.modules, module, PlayedHid())
+    monkeypatch.setitem(sys.modules, other, None)
+    SpaceMouse().open()
+
+
 def test_without_hidapi_it_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "hid", None)
+    monkeypatch.setitem(sys.modules, HID, None)
     with pytest.raises(HandrailError, match=r"expected hidapi, found none; .*\[devices\]"):
         SpaceMouse().open()
