@@ -176,6 +176,6 @@ def _parsed(message: bytes) -> dict[str, Any] | None:
 def _jpeg(body: LeKiwiBody, camera: str) -> bytes:
     import cv2
 
-    picture = cv2.cvtColor(body.picture(camera), cv2.COLOR_RGB2BGR)
+    picture = body.picture(camera)  # RGB, though OpenCV takes it for BGR: LeRobot's host does so, too
     done, coded = cv2.imencode(".jpg", picture, [int(cv2.IMWRITE_JPEG_QUALITY), _QUALITY])
     return coded.tobytes() if done else b""

@@ -140,8 +140,7 @@ class Link:
         for camera in cameras:
             if camera not in self._said:
                 raise HandrailError(f"robot {self._name}: camera {camera} says nothing; look at its cable")
-            # LeRobot's client hands on OpenCV's pictures, whose colours are the other way round
-            picture = cv2.cvtColor(np.asarray(self._said[camera]), cv2.COLOR_BGR2RGB)
+            picture = np.asarray(self._said[camera])  # RGB, as LeRobot's camera said it
             seen[camera] = cv2.resize(picture, size[::-1], interpolation=cv2.INTER_AREA)
         return seen
 

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -104,13 +105,29 @@ def test_another_robot_is_refused_at_once():
 
 def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
     picture = np.zeros((480, 640, 3), np.uint8)
-    picture[..., 2] = 200  # red, as OpenCV has it
+    picture[..., 0] = 200  # red, as LeRobot's client has it
     one = link(PlayedClient(cameras={"front": picture}))
     seen = one.pictures(("front",), (64, 96))["front"]
     assert seen.shape == (64, 96, 3)
     assert seen[0, 0].tolist() == [200, 0, 0]
     with pytest.raises(HandrailError, match="camera wrist says nothing"):
         one.pictures(("wrist",), (64, 64))
+
+
+def test_what_is_red_before_a_lekiwis_camera_is_red_in_the_dataset():
+    """By LeRobot's own camera, its host's coding and its client's decoding."""
+    import cv2
+    from lerobot.cameras.opencv import OpenCVCamera
+    from lerobot.robots.lekiwi import LeKiwiClient
+    from lerobot.robots.lekiwi.config_lekiwi import lekiwi_cameras_config
+
+    camera: Any = OpenCVCamera(lekiwi_cameras_config()["front"])
+    driver = np.zeros((camera.capture_height, camera.capture_width, 3), np.uint8)
+    driver[..., 2] = 200  # red, as OpenCV's driver has it
+    _, coded = cv2.imencode(".jpg", camera._postprocess_image(driver))
+    said = LeKiwiClient._decode_image(mock.Mock(), coded.tobytes())
+    seen = link(PlayedClient(cameras={"front": said})).pictures(("front",), (48, 64))["front"]
+    assert seen[24, 32].tolist() == pytest.approx([200, 0, 0], abs=5)
 
 
 @pytest.mark.parametrize(
