@@ -219,10 +219,17 @@ def connect(
         port_zmq_cmd=config.port_zmq_cmd,
         port_zmq_observations=config.port_zmq_observations,
         cameras={name: camera for name, camera in lekiwi_cameras_config().items() if name in cameras},
+        polling_timeout_ms=min(15, round(250.0 / fps)),  # or the next command is late
     )
 
     class WholeClient(LeKiwiClient):
-        """Says NaN of what a message lacks, where LeRobot's says 0.0."""
+        """Says NaN of what a message lacks, where LeRobot's says 0.0; is let go when its robot is gone."""
+
+        def connect(self) -> None:
+            super().connect()
+            sockets: tuple[Any, ...] = self.zmq_cmd_socket, self.zmq_observation_socket
+            for each in sockets:
+                each.linger = 500  # without it, letting go waits until the last command is taken [ms]
 
         def _parse_observation(self, frames: list[bytes]) -> dict[str, Any] | None:
             unsaid = dict.fromkeys(self._state_order, math.nan)

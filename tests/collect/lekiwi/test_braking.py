@@ -1,6 +1,8 @@
 """A robot behind a client moves no further than it may, whatever it says; it brakes whoever lets it go."""
 
 import json
+import subprocess
+import sys
 import threading
 from types import SimpleNamespace
 from unittest import mock
@@ -86,6 +88,35 @@ def wire():
         first.join()
         yield says, link
         link.close()
+
+
+HOST = """
+import sys, zmq
+context = zmq.Context()
+takes, says = context.socket(zmq.PULL), context.socket(zmq.PUSH)
+print(*(each.bind_to_random_port("tcp://127.0.0.1") for each in (takes, says)), flush=True)
+while True:
+    says.send_string(sys.argv[1])
+    takes.recv()
+"""
+
+
+def test_a_robot_whose_host_has_died_can_be_let_go():
+    """Before, what it had not taken was waited for: the recording never ended."""
+    pytest.importorskip("zmq", reason="pip install '.[lekiwi]'")
+    words = [sys.executable, "-c", HOST, json.dumps({"_cams": [], **GOOD})]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as host:
+        assert host.stdout
+        ports = map(int, host.stdout.readline().split())
+        link = connect("lekiwi", ClientConfig("127.0.0.1", *ports), (), MODEL, 20)
+        link.exchange([0.1, 0, 0, 0, 0, 0, 0, 0, 0])
+        host.kill()
+    with pytest.raises(HandrailError, match="nothing usable heard"):
+        until(link, lambda: False)
+    closing = threading.Thread(target=link.close, daemon=True)
+    closing.start()
+    closing.join(20.0)
+    assert not closing.is_alive()
 
 
 def until(link: Link, so) -> None:

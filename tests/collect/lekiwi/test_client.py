@@ -11,11 +11,12 @@ import pytest
 from command_helpers import command, refused
 from lekiwi_helpers import ZERO, FarClient, PlayedClient, rude_drive
 
+from handrail.collect.client_config import ClientConfig
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
 from handrail.collect.lekiwi import client_plant
 from handrail.collect.lekiwi.client_plant import ClientPlant
-from handrail.collect.lekiwi.link import Link
+from handrail.collect.lekiwi.link import Link, connect
 from handrail.collect.world.scene import Scene, Viewpoint
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.threads import single_threaded
@@ -184,6 +185,22 @@ def test_a_base_whose_next_command_is_late_is_sent_the_stop_and_that_is_said(cap
     with caplog.at_level(logging.WARNING):
         link.close()
     assert "commands were late" in caplog.text
+
+
+@pytest.mark.parametrize("fps", [20, 30, 50])
+def test_a_robot_that_says_nothing_new_does_not_make_the_next_command_late(fps):
+    """LeRobot's client waits for news; an operator, the MPC and the recorder need a fifth of the period."""
+    with mock.patch("handrail.collect.lekiwi.link.Link", lambda client, *_: client):
+        made: Any = connect("lekiwi", ClientConfig("127.0.0.1"), (), load_model("lekiwi"), fps)
+    client = FarClient(0.0, 0.0, 0)
+    far = Link(client, "lekiwi", load_model("lekiwi"), 1 / fps, False, client.clock, client.sleep)
+    client.link, say = far, client.get_observation
+    client.get_observation = lambda: (client.sleep(made.polling_timeout_ms / 1000), say())[1]
+    for _ in range(2 * fps):
+        client.sleep(0.2 / fps)
+        far.exchange([0.1, 0, 0, 0, 0, 0, 0, 0, 0])
+    assert not far.late
+    far.close()
 
 
 def test_a_dataset_that_cannot_say_what_was_driven_is_refused_before_the_robot_moves(tmp_path):
