@@ -67,10 +67,16 @@ class LeaderArm:
         return self._last
 
     def close(self) -> None:
-        """Let it go."""
-        teleoperator, self._teleoperator = self._teleoperator, None
-        if teleoperator is not None and teleoperator.is_connected:
-            teleoperator.disconnect()
+        """Let it go; the port, too, which LeRobot leaves open where the motors no longer answer."""
+        arm, self._teleoperator = self._teleoperator, None
+        try:
+            if arm is not None and arm.is_connected:
+                arm.disconnect()
+        finally:
+            for each in (arm, getattr(arm, "left_arm", None), getattr(arm, "right_arm", None)):
+                port = getattr(getattr(each, "bus", None), "port_handler", None)
+                if port is not None and getattr(port, "is_open", False):
+                    port.closePort()
 
     def _makes_sense(self, joints: Mapping[str, float], now: float) -> bool:
         """Whether all is finite, and a hand can have moved it so since; after a long time, it can."""

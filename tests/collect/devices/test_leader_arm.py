@@ -1,11 +1,14 @@
 """Laws of a leader arm: recorded motion comes through; garbage, jumps and a cut cable steer nothing."""
 
 import math
+import os
+import pty
 
 import pytest
 from device_players import recorded
 from played_leader import CALIBRATION, PLAYED, SOURCES, UR10, PlayedLeader, PlayedLeaderConfig
 
+from handrail.collect.devices import leader_arm
 from handrail.collect.devices.leader_arm import LeaderArm
 from handrail.controllers.errors import HandrailError
 
@@ -92,6 +95,39 @@ def test_a_cut_cable_is_a_device_that_is_gone_at_once(arm):
     PLAYED.plugged = True
     arm.open()
     assert arm.read().joints
+
+
+@pytest.mark.parametrize("arms", [1, 2])
+def test_the_ports_of_arms_that_are_unplugged_are_closed(tmp_path, monkeypatch, arms):
+    """By LeRobot's own leaders; one whose port stayed open came back under another name."""
+    pytest.importorskip("scservo_sdk", reason="pip install 'lerobot[feetech]'")
+    from lerobot.teleoperators.bi_so_leader import BiSOLeader, BiSOLeaderConfig
+    from lerobot.teleoperators.so_leader import SO101Leader, SO101LeaderConfig, SOLeaderConfig
+
+    pairs = [pty.openpty() for _ in range(arms)]
+    ports = [os.ttyname(slave) for _, slave in pairs]
+    if arms == 1:
+        made = SO101Leader(SO101LeaderConfig(port=ports[0], calibration_dir=tmp_path))
+        buses = [made.bus]
+    else:
+        left, right = map(SOLeaderConfig, ports)
+        sides = {"left_arm_config": left, "right_arm_config": right}
+        made = BiSOLeader(BiSOLeaderConfig(calibration_dir=tmp_path, **sides))
+        buses = [made.left_arm.bus, made.right_arm.bus]
+
+    def connected(teleoperator, name):
+        for bus in buses:
+            bus.connect(handshake=False)
+        return teleoperator
+
+    monkeypatch.setattr(leader_arm, "connected", connected)
+    arm = LeaderArm(lambda: made, "leader", SOURCES)
+    arm.open()
+    for end in (end for pair in pairs for end in pair):
+        os.close(end)
+    with pytest.raises(Exception):  # noqa: B017, PT011  whatever a driver's code raises
+        arm.close()
+    assert not any(bus.port_handler.is_open for bus in buses)
 
 
 @pytest.mark.parametrize(
