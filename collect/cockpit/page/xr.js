@@ -48,6 +48,7 @@ export class XrHands {
     session.addEventListener("visibilitychange", () => { if (session.visibilityState !== "visible") this.letGo(); });
     await (session.domOverlayState ? this.overlay(session) : this.draw(session));
     this.space = await session.requestReferenceSpace("local");
+    this.space.addEventListener?.("reset", () => this.lost(this.leads.size)); // it was centred anew: every pose jumps
     this.session = session;
     this.button.setAttribute("aria-pressed", "true");
     this.ask("frame", "world"); // the pose is meant in the scene
@@ -102,6 +103,11 @@ export class XrHands {
     this.leads.clear();
   }
 
+  lost(isHeld) {
+    if (isHeld) this.say("The device has lost its place: let go, and press again.");
+    this.letGo();
+  }
+
   // Where the sources are in this frame of the session; where one is not tracked, all have let go.
   step(frame) {
     if (!this.session) return;
@@ -110,8 +116,7 @@ export class XrHands {
       const space = lead.source.gripSpace;
       lead.now = placed(space ? frame.getPose(space, this.space) : frame.getViewerPose(this.space));
       if (!lead.now || !this.hands[hand]) {
-        if (lead.start) this.say("The device has lost its place: let go, and press again.");
-        this.letGo();
+        this.lost(lead.start);
         return;
       }
       lead.start ??= { ...lead.now, hand: this.hands[hand] };

@@ -16,7 +16,7 @@ window.pose = {emulatedPosition: false,
 class Session extends EventTarget {
   visibilityState = "visible";
   updateRenderState() {}
-  async requestReferenceSpace() { return {}; }
+  async requestReferenceSpace() { return (window.space = new EventTarget()); }
   cancelAnimationFrame() {}
   requestAnimationFrame(step) { setTimeout(() => step(0, {getViewerPose: () => window.pose}), 20); }
   domOverlayState = {type: "screen"};
@@ -176,6 +176,25 @@ def test_a_device_with_a_pose_leads_the_hand_while_it_is_held_and_tracked(on_ben
     page.wait_for_timeout(300)
     assert at_rest(made.wait(lambda intent: True))  # until it is pressed anew
     page.evaluate("press('selectend')")
+
+
+def test_a_device_that_is_centred_anew_moves_nothing_until_it_is_pressed_again(on_bench):
+    made, driver = on_bench(script=XR)
+    page, forward = driver.page, 3
+    driver.begin()
+    page.locator("#xr").click()
+    expect(driver.at("frame")).to_have_value("world")
+    for before, after in ((0.0, -0.05), (0.4, 0.35)):
+        page.evaluate("(z) => { pose.transform.position.z = z; press('selectstart'); }", before)
+        page.wait_for_timeout(300)
+        page.evaluate("(z) => { pose.transform.position.z = z; }", after)
+        led = made.wait(moves(forward))
+        assert led.raw.values[forward] == pytest.approx(8 * 0.05, abs=0.01)
+        page.evaluate("space.dispatchEvent(new Event('reset')); pose.transform.position.z = 0.4")
+        made.wait(at_rest)
+        page.wait_for_timeout(300)
+        assert at_rest(made.wait(lambda intent: True))
+        expect(driver.at("notice")).to_contain_text("lost its place")
 
 
 def test_thumbs_reach_sticks_and_a_lost_pointer_lets_go(on_bench):
