@@ -34,7 +34,11 @@ Say = Callable[[str], None]
 
 
 def open_device(
-    config: RecordConfig, env: HandrailEnv, say: Say, modes: Mapping[str, TeleopMode] | None = None
+    config: RecordConfig,
+    env: HandrailEnv,
+    say: Say,
+    modes: Mapping[str, TeleopMode] | None = None,
+    with_keys: bool = True,
 ) -> LocalPerson:
     """Return a person with the device that the operator is named after.
 
@@ -45,10 +49,11 @@ def open_device(
         env: of the recording.
         say: is told what to hold.
         modes: that one can change to; all by default.
+        with_keys: whether the terminal's keys are free to be read.
     """
     hands = len(env.model.description.hands)
     main, beside = _reader(config.operator, config.teleop, hands, bool(config.policy)), None
-    if config.operator != "keyboard" and has_terminal():
+    if with_keys and config.operator != "keyboard" and has_terminal():
         beside = _reader("keyboard", TeleopConfig(), hands)
         beside.controls = beside.controls.only()
     person = _person(config, env, modes or build_modes(config, env), main, beside)

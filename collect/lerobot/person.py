@@ -54,4 +54,4 @@ class HandrailGamepad(SimTeleoperator):
         config = replace(RecordConfig(**said, teleop=self._settings), operator="gamepad")
         owned = partial(robot.mode.owned, hand=robot.env.model.hand.name)
         mode = replace(robot.mode, groups=owned)  # whichever hand is chosen, its action is of this one
-        return open_device(config, robot.env, print, {mode.name: mode})
+        return open_device(config, robot.env, print, {mode.name: mode}, with_keys=False)  # LeRobot reads them

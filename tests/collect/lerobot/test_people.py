@@ -7,6 +7,7 @@ from itertools import count
 import pytest
 from cockpit_helpers import drive, page, told
 
+from handrail.collect.devices import open_devices
 from handrail.collect.lerobot import (
     HandrailCockpit,
     HandrailCockpitConfig,
@@ -89,6 +90,14 @@ def test_a_person_with_a_gamepad_drives(robot, pad, tmp_path):
         until(robot, teleop, lambda action: NEXT in action)
     finally:
         teleop.disconnect()
+
+
+def test_lerobot_s_keys_are_lerobot_s_alone(robot, monkeypatch, tmp_path):
+    """Two readers of one terminal get each key by chance."""
+    monkeypatch.setattr(open_devices, "has_terminal", lambda: True)
+    monkeypatch.setattr(open_devices, "_person", lambda *given: given)
+    *_, beside = HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))._made(robot)
+    assert beside is None
 
 
 def test_a_gamepad_steers_the_hand_of_the_action_whichever_is_chosen(pad, tmp_path):
