@@ -12,12 +12,14 @@ import pytest
 from places import ROOT
 
 RESULTS = ROOT / "docs" / "results"
-LINE = r"(\w+): (\S+) \((\S+) to (\S+)\), 8 draws, p (\S+), after Holm (\S+)"
+PRESETS = ROOT / "policies" / "study" / "presets"
+LINE = r"(.+): (\S+) \((\S+) to (\S+)\), 8 draws.*, p (\S+), after Holm (\S+)"
+DESIGNS = {"factors": RESULTS / "teleop_modes_factors.toml", "answer": PRESETS / "answer.toml"}
 
 
-def test_what_was_declared_comes_out_as_published():
-    archive = RESULTS / "teleop_modes_factors.tar.xz"
-    design = RESULTS / "teleop_modes_factors.toml"
+@pytest.mark.parametrize("study", DESIGNS)
+def test_what_was_declared_comes_out_as_published(study):
+    archive, design = RESULTS / f"teleop_modes_{study}.tar.xz", DESIGNS[study]
     done = subprocess.run(
         [sys.executable, RESULTS / "recompute.py", archive, design],
         capture_output=True,
@@ -25,14 +27,19 @@ def test_what_was_declared_comes_out_as_published():
         check=True,
     )
     found = {name: [float(each) for each in numbers] for name, *numbers in re.findall(LINE, done.stdout)}
-    published = json.loads((RESULTS / "teleop_modes_factors.json").read_text())["contrasts"]
-    declared = {each["name"].partition(":")[0]: each for each in published if each["kind"] == "declared"}
+    published = json.loads((RESULTS / f"teleop_modes_{study}.json").read_text())["contrasts"]
+    declared = {
+        each.get("group") or each["name"].partition(":")[0]: each["estimate"] | each
+        if study == "factors"
+        else each
+        for each in published
+        if "declared" in (each.get("family"), each.get("kind"))
+    }
     assert len(declared) == 3
     assert found.keys() == declared.keys()
     for name, each in declared.items():
-        estimate = each["estimate"]
-        shares = [100 * share for share in (estimate["value"], *estimate["interval"])]
-        assert found[name] == pytest.approx([*shares, estimate["p"], each["p_adjusted"]], abs=1e-3)
+        shares = [100 * share for share in (each.get("value", each["estimate"]), *each["interval"])]
+        assert found[name] == pytest.approx([*shares, each["p"], each["p_adjusted"]], abs=1e-3)
 
 
 def test_an_archive_that_lacks_a_draw_is_not_tested(tmp_path):
