@@ -1,6 +1,6 @@
 """What an encoder says of an episode: as its pictures show it, or as it would be said without an error."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any
 
@@ -15,9 +15,10 @@ from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.recording.frames import PICTURE
 from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.encoder import Encoder
-from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.scene_memory import SceneMemory
 
+Columns = dict[str, np.ndarray]
 _AT_ONCE = 4  # moments: what a core has near it; more takes twice as long
 
 
@@ -38,7 +39,17 @@ def tellable(environment: FloatArray, encoder: Encoder) -> FloatArray:
     return told
 
 
-def encoded(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encoder: Encoder) -> FloatArray:
+def encoded(
+    info: DatasetInfo, rows: Sequence[Mapping[str, Any]], encoder: Encoder, episodes: Iterable[Columns]
+) -> Iterator[Columns]:
+    """Yield episodes with what an encoder can say of where things are: the truth, where it was recorded."""
+    for row, episode in zip(rows, episodes, strict=True):
+        truth = episode.get(ENVIRONMENT)
+        said = _read(info, row, episode[STATE], encoder) if truth is None else tellable(truth, encoder)
+        yield episode | {ENVIRONMENT: said}
+
+
+def _read(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encoder: Encoder) -> FloatArray:
     """Return the environment's state of an episode as an encoder says it, (T, e) float32.
 
     Args:

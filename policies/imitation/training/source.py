@@ -30,7 +30,7 @@ from handrail.policies.imitation.interface.interface import (
 )
 from handrail.policies.imitation.training.corrections import Draws, corrected
 from handrail.policies.imitation.training.earlier import same_interface
-from handrail.policies.imitation.training.encoded import check_fits, encoded, tellable
+from handrail.policies.imitation.training.encoded import check_fits, encoded
 from handrail.policies.imitation.training.memory import (
     PICTURES,
     MemoryDataset,
@@ -214,21 +214,11 @@ def _interpreted(
     episodes = _episodes(info, selection, [key for key in COLUMNS if key in info.features])
     if encoder:
         check_fits(encoder, interface)
-        episodes = _encoded(info, selection, encoder, episodes)
+        episodes = encoded(info, selection.rows, encoder, episodes)
     columns = _joined(map(learnt, episodes))
     names = zip(columns, (*interface.observation_names, interface.action_names), strict=True)
     features = {key: Feature("float32", (len(each),), each) for key, each in names if each}
     return interface, features, {key: columns[key] for key in features}
-
-
-def _encoded(
-    info: DatasetInfo, selection: Selection, encoder: Encoder, episodes: Iterable[Columns]
-) -> Iterator[Columns]:
-    """Yield episodes with what an encoder can say of where things are: the truth, where it was recorded."""
-    for row, episode in zip(selection.rows, episodes, strict=True):
-        truth = episode.get(ENVIRONMENT)
-        said = encoded(info, row, episode[STATE], encoder) if truth is None else tellable(truth, encoder)
-        yield episode | {ENVIRONMENT: said}
 
 
 def _check_one_mode(info: DatasetInfo, selection: Selection, said: str) -> None:

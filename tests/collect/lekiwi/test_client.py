@@ -116,17 +116,15 @@ def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
 
 
 def test_what_is_red_before_a_lekiwis_camera_is_red_in_the_dataset():
-    """By LeRobot's own camera, its host's coding and its client's decoding."""
+    """Its camera says RGB; its host codes that, and LeRobot's client decodes it, as if it were BGR."""
     import cv2
-    from lerobot.cameras.opencv import OpenCVCamera
-    from lerobot.robots.lekiwi import LeKiwiClient
+    from lerobot.cameras import ColorMode
     from lerobot.robots.lekiwi.config_lekiwi import lekiwi_cameras_config
 
-    camera: Any = OpenCVCamera(lekiwi_cameras_config()["front"])
-    driver = np.zeros((camera.capture_height, camera.capture_width, 3), np.uint8)
-    driver[..., 2] = 200  # red, as OpenCV's driver has it
-    _, coded = cv2.imencode(".jpg", camera._postprocess_image(driver))
-    said = LeKiwiClient._decode_image(mock.Mock(), coded.tobytes())
+    cameras: Any = lekiwi_cameras_config()
+    assert {camera.color_mode for camera in cameras.values()} == {ColorMode.RGB}
+    _, coded = cv2.imencode(".jpg", np.full((48, 64, 3), (200, 0, 0), np.uint8))
+    said = cv2.imdecode(coded, cv2.IMREAD_COLOR)
     seen = link(PlayedClient(cameras={"front": said})).pictures(("front",), (48, 64))["front"]
     assert seen[24, 32].tolist() == pytest.approx([200, 0, 0], abs=5)
 
