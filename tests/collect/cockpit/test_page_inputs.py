@@ -97,7 +97,7 @@ def test_keys_are_changed_on_the_card_but_never_the_stop(on_bench):
     driver.at("help-reset").click()
     driver.press("KeyH")
     driver.press("Enter")
-    driver.expect_phase("paused")
+    driver.expect_phase("ready: press Start")
 
 
 def test_sliders_take_the_arm_from_where_it_is(on_bench):
