@@ -42,7 +42,7 @@ class Card:
     trouble: str = ""
     """With a device, and what to do."""
     grips: Sequence[float] = (0.0,)
-    """Which grippers shall be closed, one a hand."""
+    """How far each gripper shall be, 0 open to 1 closed, one a hand."""
     apart: float | None = None
     """How far a leader arm stands from the robot's arm, at most [rad]; none without a leader."""
 

@@ -173,7 +173,7 @@ class LocalPerson:
         hands = self.person.meaning.hands
         grips = {"grip": hands.index(self.person.setting.hand), "grip_left": 0, "grip_right": len(hands) - 1}
         if action in grips:
-            self.person.grip(grips[action], not self.person.closed[grips[action]] > 0.5)
+            self.person.grip(grips[action])
         elif action == "help":
             self._card.is_helping = not self._card.is_helping
         elif action == "focus" and not self._main.next_bank(self._steered):

@@ -103,7 +103,7 @@ def prepare(
             write_whole(root / PREVIEW, picture)
     said = _write_card(root, repo_id, license_id)
     names = [path.relative_to(root).as_posix() for path in sorted(root.rglob("*")) if path.is_file()]
-    files = [name for name in names if _goes(name)]
+    files = [name for name in names if _is_sent(name)]
     home = os.path.realpath(root)
     if linked := [name for name in files if os.path.realpath(root / name) != os.path.join(home, name)]:
         raise HandrailError(
@@ -196,7 +196,7 @@ def _check_hub(push: Upload) -> None:
         raise HandrailError(
             f"--upload: {push.repo_id} is on the hub and public: say --no_private, or make it private there"
         )
-    there = {name for name in hub.list_repo_files(push.repo_id, repo_type="dataset") if _goes(name)}
+    there = {name for name in hub.list_repo_files(push.repo_id, repo_type="dataset") if _is_sent(name)}
     if stale := sorted(there - set(push.files)):
         raise HandrailError(
             f"--upload: {push.repo_id} on the hub has {len(stale)} files that this dataset has not, such as"
@@ -204,7 +204,7 @@ def _check_hub(push: Upload) -> None:
         )
 
 
-def _goes(name: str) -> bool:
+def _is_sent(name: str) -> bool:
     return any(fnmatch(name, pattern) for pattern in SENT) and name[0] != "."
 
 

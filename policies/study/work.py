@@ -187,7 +187,9 @@ def _is_corrected(root: Path) -> bool:
     return any(map(_steered, each_opened(learnt)))
 
 
-def _check_checkpoints(job: StudyJob, policy: StudyPolicy, design: StudyDesign, layout: StudyLayout) -> None:
+def _remove_without_checkpoints(
+    job: StudyJob, policy: StudyPolicy, design: StudyDesign, layout: StudyLayout
+) -> None:
     """Remove a trained policy, and how it drove, if an earlier checkpoint that is to drive is gone."""
     last = last_checkpoint(layout.policy(policy))
     if last is None or int(last.name) < design.tasks[policy.cell.task].steps:
@@ -210,7 +212,7 @@ def _train_and_evaluate(
     config = training(policy, design, root, layout.policy(policy))
     if config.corrections == "weighted" and not _is_corrected(root):
         config = replace(config, corrections="all")
-    _check_checkpoints(job, policy, design, layout)
+    _remove_without_checkpoints(job, policy, design, layout)
     folder = train(config)
     remove(layout.merged(policy.cell))
     trained = time.monotonic()

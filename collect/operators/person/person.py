@@ -102,7 +102,7 @@ class Person:
             return
         for hand, (now, before) in enumerate(zip(inputs.grips, self._grips, strict=False)):
             if now != before:
-                self.grip(hand, not self.closed[hand] > 0.5)
+                self.grip(hand)
         self._grips = inputs.grips
         self.inputs, self.received, self.round_trip = inputs, received, round_trip
         self._armed |= inputs.on and inputs.is_let_go
@@ -113,9 +113,9 @@ class Person:
         if self.phase in (Phase.DRIVING, Phase.LOST):
             self.phase = Phase.PAUSED
 
-    def grip(self, hand: int, closed: bool) -> None:
-        """Close or open a gripper."""
-        self.closed[hand] = float(closed)
+    def grip(self, hand: int, closed: bool | None = None) -> None:
+        """Close or open a gripper; by default the other of both."""
+        self.closed[hand] = float(self.closed[hand] <= 0.5 if closed is None else closed)
 
     def ask(self, ask: Ask) -> None:
         """Do what the operator asks for; what makes no sense now is left undone."""

@@ -87,6 +87,18 @@ def test_each_gripper_is_asked_for_itself():
         assert steering.act().grippers == tuple(map(float, grips))
 
 
+def test_a_page_that_comes_in_another_state_changes_no_gripper():
+    """One that was loaded anew, or another one that drives now: only what it changes itself counts."""
+    steering = Steering()
+    steering.drive((True, False))
+    steering.person.lose()
+    steering.drive((False, False))
+    steering.person.ask(Ask("start"))
+    assert steering.act().grippers == (1.0, 0.0)
+    steering.drive((True, False))
+    assert steering.act().grippers == (0.0, 0.0)
+
+
 @pytest.mark.parametrize("grips", [(), (True,), (True, True, True)])
 def test_an_input_for_another_number_of_hands_is_not_taken(grips):
     steering = Steering()
