@@ -1,4 +1,4 @@
-"""What a recording session is made of, as typed settings; light to import."""
+"""The settings of a recording session, typed; light to import."""
 
 import os
 from dataclasses import dataclass, field
@@ -36,16 +36,16 @@ _ONE_PROCESS = ("policy", "robot_client", "realtime", "display_data", "display_w
 
 @dataclass(frozen=True)
 class SessionConfig:
-    """Who steers what, how, and what is watched."""
+    """The operator, the task, the mode and the display of a session."""
 
     task: Annotated[str, one_of(TASKS)] = "pick_place"
-    """What to do."""
+    """The task."""
     mode: Annotated[str, one_of(MODES)] = "ee"
     """Teleop mode: what the operator steers, and what becomes of it."""
     mask: Advanced[str] = ""
     """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
     operator: Annotated[str, one_of(OPERATORS)] = "scripted"
-    """Who steers."""
+    """The operator."""
     noise: Advanced[Annotated[float, Meta(ge=0, le=5)]] = 1.0
     """How human the scripted hand is: 0 perfect, 1 the default, partly from studies of people."""
     human: Advanced[HumanSettings] = field(default_factory=HumanSettings)
@@ -99,7 +99,7 @@ class SessionConfig:
 
     @property
     def mode_name(self) -> str:
-        """What the data calls it: the mode's name, or the mask that is steered with instead."""
+        """Its name in the data: the mode's name, or the mask that is steered with instead."""
         return f"mask:{self.mask}" if self.mask else self.mode
 
     def check(self) -> None:
@@ -159,7 +159,7 @@ class DatasetConfig(StoredConfig):
     fps: Advanced[int] = 20
     """Control and recording rate [Hz], 10 to 100."""
     single_task: Advanced[str] = ""
-    """What is done, in words; the task's own sentence when empty."""
+    """The task in words; the task's own sentence when empty."""
 
     def check(self) -> None:
         """Check the settings."""
@@ -275,7 +275,7 @@ class DriveConfig(RecordConfig):
     """Drive a robot in a browser, and record demonstrations as a LeRobot dataset."""
 
     task: Annotated[str, one_of(TASKS)] = "reach"
-    """What to do."""
+    """The task."""
     dataset: FoundDatasetConfig = field(default_factory=FoundDatasetConfig)
     cockpit: CockpitConfig = field(default_factory=CockpitConfig)
 

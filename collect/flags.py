@@ -1,4 +1,4 @@
-"""What settings of several commands have in common: two ways to say one thing, names from a list, a file."""
+"""Helpers for the settings of several commands: two ways to say one thing, names from a list, a file."""
 
 from collections.abc import Collection
 from pathlib import Path

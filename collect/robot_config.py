@@ -1,4 +1,4 @@
-"""What the commands that make and check robots ask for."""
+"""The settings of the commands that make and check robots."""
 
 import re
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class NewRobotConfig:
     hands: Names = ""
     """Link at the end of the hand; of several hands NAME=LINK each, such as left=l_tool,right=r_tool."""
     base: Literal["planar", "fixed"] = "planar"
-    """What it stands on: a base that drives, added where the URDF has none, or the floor."""
+    """Its base: planar drives (added where the URDF has none), fixed stands on the floor."""
     joints: Names = ""
     """Joints that move besides those of the hands; where none are named, those of a head."""
     output: str = ""

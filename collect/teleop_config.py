@@ -40,7 +40,7 @@ class TeleopConfig(LeaderConfig):
     """The device in your hand, with --operator gamepad, spacemouse, keyboard or leader_arm."""
 
     beside: Literal["keyboard", "gamepad"] = "keyboard"
-    """What moves the base beside a leader arm, and has its clutch: keyboard or gamepad."""
+    """The device that moves the base beside a leader arm, and has its clutch: keyboard or gamepad."""
     map: str = ""
     """File (.toml) that gives controls another meaning; what it does not name stays as it is."""
     dead_zone: Annotated[float, Meta(ge=0, le=0.5)] = 0.12

@@ -15,11 +15,11 @@ _REFERENCE = re.compile(r"[\w.]+:\w+")
 
 
 class Named(Protocol):
-    """What a registry holds: a frozen dataclass with a name and a line of help."""
+    """An entry of a registry: a frozen dataclass with a name and a line of help."""
 
     @property
     def name(self) -> str:
-        """What the command line and the data call it."""
+        """Its name on the command line and in the data."""
         ...
 
     @property
@@ -61,7 +61,7 @@ class Registry[Spec: Named](Mapping[str, Spec]):
 
     @property
     def built_in(self) -> tuple[Spec, ...]:
-        """What comes with Handrail."""
+        """The entries that come with Handrail."""
         return tuple(self._built_in.values())
 
     def __iter__(self) -> Iterator[str]:

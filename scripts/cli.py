@@ -1,4 +1,4 @@
-"""What every command shares: LeRobot-like flags, one line an error, exit codes."""
+"""Shared by every command: LeRobot-like flags, one line an error, exit codes."""
 
 import contextlib
 import ctypes

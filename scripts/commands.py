@@ -13,7 +13,7 @@ ENTRY = "handrail.scripts.__main__:main"  # of all commands
 
 @dataclass(frozen=True)
 class Verb:
-    """What a command, or one of its words, does."""
+    """The work of a command, or of one of its words."""
 
     help: str
     """One line."""
@@ -41,7 +41,7 @@ class Program:
     help: str
     """One line."""
     verbs: Mapping[str, Verb]
-    """What it does, by the word that says it; what does one thing has it under the empty word."""
+    """Its verbs by their words; a command without words has one under the empty word."""
 
 
 def _program(entry: Any) -> Program:

@@ -142,7 +142,7 @@ class Cockpit:
 
     @property
     def _all_dropped(self) -> dict[str, int]:
-        """What was dropped or refused on the way to pages and back, by why."""
+        """Messages dropped or refused on the way to pages and back, counted by reason."""
         kinds, ours = {"frames": Kind.FRAME, "pictures": Kind.PICTURE}, self._server.pipe.dropped
         return self._dropped | {
             f"{what} without room": ours[kind] for what, kind in kinds.items() if ours[kind]

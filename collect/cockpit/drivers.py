@@ -1,4 +1,4 @@
-"""Who drives what now, of a person and a policy beside them; and where the policy's plan leads."""
+"""The channels that a person and a policy drive now, and where the policy's plan leads."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -169,7 +169,7 @@ class Hub:
                 self._lose()
             self._tell_all()
         elif not self._lease.drives(page.name):
-            self.counts["input of who does not drive"] += 1
+            self.counts["input of pages that do not drive"] += 1
         elif isinstance(said, Drive):
             self._drive(page, said, now)
         elif isinstance(said, Ask) and said.what == "stop" and page.echo <= self._stopped:  # not yet seen

@@ -1,8 +1,8 @@
 """The pipe between the recording and the web server: whole messages, never a wait.
 
-The recording must not wait for a page, nor the server for the robot. What comes many times a second (frames,
-pictures, inputs) is dropped where there is no room; what is said once (a scene, a mode) waits until there is.
-What takes motion away is never dropped, and goes first.
+The recording must not wait for a page, nor the server for the robot. Messages that come many times a second
+(frames, pictures, inputs) are dropped where there is no room; those said once (a scene, a mode) wait until
+there is. A message that takes motion away is never dropped, and goes first.
 """
 
 import socket
@@ -23,7 +23,7 @@ _MORE, _LAST = b"+", b"."
 
 
 class Kind(StrEnum):
-    """What a message is: of the recording, as pages are told it, and of the server."""
+    """The kind of a message: of the recording, as pages are told it, and of the server."""
 
     FRAME, PICTURE, STAGE, CARD, OVER = "frame", "picture", "stage", "card", "over"
     NOTE, DRIVE, ASK, STILL, STOP = "note", "drive", "ask", "still", "stop"

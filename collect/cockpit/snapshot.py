@@ -1,4 +1,4 @@
-"""What the page shows of a moment: one small value, many times a second."""
+"""The state that the page shows: one small value, many times a second."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

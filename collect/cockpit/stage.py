@@ -1,4 +1,4 @@
-"""What a browser needs to draw an episode: shapes once, and where each body is, many times a second."""
+"""The data that a browser draws an episode from: shapes once, and where each body is, many times a second."""
 
 import hashlib
 from typing import Any

@@ -1,4 +1,4 @@
-"""What came of a recording, as it goes and at its end."""
+"""The account of a recording, as it goes and at its end."""
 
 import shutil
 import sys
@@ -32,13 +32,13 @@ def _why_dropped(outcome: Outcome) -> str:
 
 @dataclass
 class RecordingLog:
-    """What has been recorded in this run, and what the operator did not want to keep."""
+    """The episodes recorded in this run, and those that the operator did not keep."""
 
     outcomes: list[Outcome] = field(default_factory=list)
     """Of the episodes that were kept."""
     dropped: list[Outcome] = field(default_factory=list)
     trouble: str = ""
-    """What ended the run before its time."""
+    """The reason why the run ended early."""
     exit_code: int = 0
     wall_time: float = 0.0
     """Of the run, where that is not the sum of its episodes' [s]."""

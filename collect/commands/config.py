@@ -1,4 +1,4 @@
-"""What the commands that look at datasets ask for."""
+"""The settings of the commands that look at datasets."""
 
 import re
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ class ReplayConfig:
 
     @property
     def said(self) -> tuple[str, ...]:
-        """What the dataset may name because the command line does."""
+        """Names that the dataset may use because the command line does."""
         return (self.task, self.mode, self.operator, self.robot)
 
     def check(self) -> None:

@@ -112,7 +112,7 @@ def _record_shared(
             if not goes_on:
                 shards.begin(writer.num_episodes)
             jobs = shards.jobs(writer.num_episodes)
-            with log.noting(f"what was recorded is kept in {shards.folder}, and the same flags go on"):
+            with log.noting(f"the recording is kept in {shards.folder}, and the same flags go on"):
                 if jobs:
                     shards.record(jobs, log, execution)
     if not log.exit_code:

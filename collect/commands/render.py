@@ -60,7 +60,7 @@ def render(config: RenderConfig) -> None:
                 drawn = any(row_files(Layout(job.arguments[1])) for job in jobs)
                 if not drawn:
                     remove(folder)
-                kept = f"; what was drawn is kept in {folder}, and the same command goes on"
+                kept = f"; drawn pictures are kept in {folder}, and the same command goes on"
                 raise HandrailError(result.error + kept * drawn)
     if jobs:
         parts = [job.arguments[1] for job in jobs]

@@ -31,7 +31,7 @@ Pictures = list[NDArray[np.uint8]]
 
 @dataclass(frozen=True)
 class Replay:
-    """What came out of a replay."""
+    """The result of a replay."""
 
     episode: int
     names: tuple[str, ...]

@@ -47,7 +47,7 @@ _MOMENT = 0.1  # [s]
 
 @dataclass(frozen=True)
 class _Plan:
-    """What is being recorded, as it lies beside the shards."""
+    """The recording's settings, as they lie beside the shards."""
 
     format: Literal["handrail.shards/1"]
     first: Count  # how many episodes the dataset had before
@@ -105,12 +105,12 @@ class Shards:
     def record(self, jobs: Sequence[Job], log: RecordingLog, execution: Execution) -> None:
         """Record the shards, and make one dataset of what was there before and of them, in order.
 
-        Nothing is encoded anew. Whoever calls has the sole right to write there.
+        Nothing is encoded anew. The caller has the sole right to write there.
         """
         for result in execution.run(jobs):
             if result.error:
                 raise HandrailError(
-                    f"{result.job.name}: {result.error}; what was recorded is kept in {self.folder}, and the"
+                    f"{result.job.name}: {result.error}; the recording is kept in {self.folder}, and the"
                     " same flags go on"
                 )
             for outcome in result.value:

@@ -1,4 +1,4 @@
-"""What the terminal shows a person: how it stands, what to do, where the hand has to go, what the keys do."""
+"""The terminal's text for a person: the state, what to do, where the hand has to go, what the keys do."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ class Card:
     horizon: float = 0.0
     """Time limit of the episode [s]."""
     before: str = ""
-    """What became of the last episode."""
+    """The outcome of the last episode."""
     brakes: str = ""
     """Why the controller brakes."""
     is_helping: bool = True

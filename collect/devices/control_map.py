@@ -1,4 +1,4 @@
-"""What the controls of a device mean: one table, from a file, that a person may change.
+"""The meaning of a device's controls: one table, from a file, that a person may change.
 
 A section says which axis a control moves while that part is steered: `[hand]` (one of several, or both as a
 pair), `[turn]` (of the hand), `[apart]` (of a pair), `[hands]` and `[hands_turn]` (two at once), `[base]`,
@@ -63,7 +63,7 @@ Moves = Mapping[str, tuple[str, int]]  # axis and sign of each control
 
 
 class Steered(NamedTuple):
-    """What is steered now."""
+    """The parts that are steered now."""
 
     hand: bool
     base: bool

@@ -1,4 +1,4 @@
-"""What a device is, what it says of one moment, and the shape of its sticks."""
+"""The interface of a device, its reading of one moment, and the shape of its sticks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import Protocol
 
 @dataclass(frozen=True)
 class DeviceInput:
-    """What a device says of one moment, in the words of its controls or, after its map, of the robot."""
+    """The reading of a device at one moment, in the words of its controls or, after its map, of the robot."""
 
     time: float
     """When that was, on the operator's clock [s]."""

@@ -24,7 +24,7 @@ NAMES = frozenset({*_NAMED.values(), *_ARROWS.values(), *(chr(code).lower() for 
 
 @dataclass(frozen=True)
 class Key:
-    """What happened to a key, or one of `SIGNALS`."""
+    """An event of a key, or one of `SIGNALS`."""
 
     name: str
     """The character, or a name such as `enter`."""

@@ -56,7 +56,7 @@ class LeaderArm:
         assert self._teleoperator is not None
         time.sleep(_PERIOD)
         try:
-            said, trouble = self._teleoperator.get_action(), "what it says makes no sense"
+            said, trouble = self._teleoperator.get_action(), "its readings make no sense"
         except Exception as error:  # whatever a driver's code raises
             said, trouble = None, message_of(error)
         now, joints = self._clock(), {name: number(said, name) for name in self._sources}

@@ -74,7 +74,7 @@ def _result(job: Job, reference: Any) -> Result:
     except RayError as error:
         return Result(
             job,
-            error=f"lost {TRIES} times with its process or computer; what was done is kept, and the same"
+            error=f"lost {TRIES} times with its process or computer; finished work is kept, and the same"
             f" command goes on: {message_of(error)}",
         )
     return replace(result, job=job)

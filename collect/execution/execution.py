@@ -158,7 +158,7 @@ class Execution:
                     pending.discard(result.job.name)
                 yield self._noted(result)
         for job in todo.values():
-            yield self._noted(Result(job, error="what it needs failed"))
+            yield self._noted(Result(job, error="a job that it needs failed"))
 
     def _noted(self, result: Result) -> Result:
         self._results.append(replace(result, value=None))

@@ -57,11 +57,11 @@ def part_jobs(call: Callable[..., Any], config: Any, stem: Path, first: int, end
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a job."""
+    """The outcome of a job."""
 
     job: Job
     value: Any = None
-    """What the call returned; None where it failed."""
+    """The call's return value; None where it failed."""
     error: str = ""
     """Why it failed, in one line; "" where it did not."""
     seconds: float = 0.0

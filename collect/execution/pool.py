@@ -117,7 +117,7 @@ class ProcessPool:
         return Result(
             job,
             error=f"a worker was killed {TRIES} times while it did this ({how}), perhaps for want of memory;"
-            " what was done is kept, and the same command goes on; fewer --workers need less",
+            " finished work is kept, and the same command goes on; fewer --workers need less",
         )
 
 

@@ -1,4 +1,4 @@
-"""What the server that processes are forked from loads first: one thread each, as they share the cores."""
+"""Modules that the fork server loads first: one thread each, as they share the cores."""
 
 import os
 

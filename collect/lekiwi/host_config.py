@@ -22,7 +22,7 @@ class HostConfig:
     """Simulate a LeKiwi on the network: LeRobot's own LeKiwiClient drives it as it drives a real one."""
 
     task: Annotated[str, one_of(TASKS)] = "reach"
-    """What stands around it."""
+    """The task; its scene stands around the robot."""
     robot: Annotated[str, one_of(ROBOTS)] = "lekiwi"
     """A LeKiwi, or its description file (.toml)."""
     seed: Annotated[int, Meta(ge=0, le=2**53 - 1)] = 0
@@ -34,7 +34,7 @@ class HostConfig:
     port_zmq_observations: Port = 5556
     """Where observations leave."""
     cameras: Names = ""
-    """What it sees: front, wrist or both; none by default (needs OpenGL)."""
+    """Its cameras: front, wrist or both; none by default (needs OpenGL)."""
     latency: Advanced[Annotated[float, Meta(ge=0, le=2)]] = 0.0
     """How late commands and observations arrive, each [s]."""
     drop: Advanced[Annotated[float, Meta(ge=0, le=1)]] = 0.0

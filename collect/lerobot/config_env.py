@@ -24,7 +24,7 @@ from handrail.controllers.typed import check
 @EnvConfig.register_subclass("handrail")
 @dataclass
 class HandrailEnvConfig(SimulatedConfig, EnvConfig):
-    """A task of Handrail. What policies read and write in it is what `handrail-record` records.
+    """A task of Handrail. Policies read and write in it the numbers that `handrail-record` records.
 
     With a mode and `scene_in_state` it is what `lerobot-record` records (`--robot.diagnostics=false`).
     """
@@ -86,7 +86,7 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
-        """What makes it."""
+        """Arguments of the environment."""
         return {
             "config": self.session(),
             "fps": self.fps,

@@ -15,10 +15,10 @@ from handrail.controllers.typed import Count, NonNegative, check
 
 @dataclass(kw_only=True)
 class SimulatedConfig:
-    """What is simulated; the names are those of `handrail-record`."""
+    """The simulated session; the names are those of `handrail-record`."""
 
     task: str = "reach"
-    """What to do."""
+    """The task."""
     robot: str = SessionConfig.robot
     """A robot, or a description file (.toml)."""
     hand: str = ""

@@ -1,6 +1,6 @@
 """People as LeRobot's `Teleoperator`s: at a browser, or with a gamepad.
 
-LeRobot has one action for all time, so the teleop mode stays. What a person says of an episode becomes a
+LeRobot has one action for all time, so the teleop mode stays. A person's word on an episode becomes a
 button: after success, failure or throwing it away comes another scene, after beginning again the same one.
 While they do not steer, the robot brakes and time stands still. LeRobot's own keys save and repeat episodes.
 """

@@ -150,12 +150,12 @@ class HandrailSim(Uncalibrated, Robot):
 
     @property
     def view(self) -> View:
-        """What there is to see now."""
+        """The observation now."""
         return self.loop.look()
 
     @property
     def grippers(self) -> tuple[float, ...]:
-        """What grippers were sent last, 0 open, 1 closed."""
+        """The last command of the grippers, 0 open, 1 closed."""
         return tuple(self.loop.now.info["sent"][self.env.model.size :].tolist())
 
     def connect(self, calibrate: bool = True) -> None:

@@ -15,14 +15,14 @@ from handrail.controllers.robot.model import Pose
 
 @dataclass(frozen=True)
 class View:
-    """What an operator sees now."""
+    """The observation of an operator."""
 
     state: State  # of the robot
     task: TaskState  # the truth of this moment
     observation: Mapping[str, Any] = field(default_factory=dict)
-    """What is recorded of it: `agent_pos`, `environment_state`, and `pixels` by camera."""
+    """The recorded observation: `agent_pos`, `environment_state`, and `pixels` by camera."""
     grippers: tuple[float, ...] = ()
-    """What each gripper was told last: 0 open to 1 closed."""
+    """The last command of each gripper: 0 open to 1 closed."""
 
     @property
     def tool(self) -> Pose:
@@ -31,7 +31,7 @@ class View:
 
 
 class EpisodeEvent(StrEnum):
-    """What a person says of the episode instead of steering; scripts and policies never do."""
+    """A person's word on the episode instead of steering; scripts and policies never do."""
 
     SUCCESS = "success"  # it is done
     FAILURE = "failure"  # it is done, and went wrong
@@ -53,7 +53,7 @@ class EpisodeEvent(StrEnum):
 
 
 class Operator(Protocol):
-    """Whoever steers: a script, a person, a trained policy."""
+    """A source of intents: a script, a person, a trained policy."""
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""

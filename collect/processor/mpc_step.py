@@ -95,15 +95,15 @@ class MaskedMpcStep(RobotActionProcessorStep):
     base_frame: Literal["base", "world"] = "base"
     """The same of the base's."""
     gripper: Literal["share", "actions"] = "share"
-    """What its entries are: share (0 open, 1 closed) or actions (LeRobot's 0 close, 1 stay, 2 open)."""
+    """The meaning of its entries: share (0 open, 1 closed) or actions (LeRobot's 0 close, 1 stay, 2 open)."""
     obstacles: list[dict[str, Any]] = field(default_factory=list)
-    """What stands around, as tables of name, kind, size, position, rpy and work_surface."""
+    """The obstacles, as tables of name, kind, size, position, rpy and work_surface."""
     start: Annotated[list[Number], Meta(min_length=3, max_length=3)] = field(
         default_factory=lambda: [0.0, 0.0, 0.0]
     )
     """Where the base is at the beginning: x, y, heading [m, rad]."""
     settings: Annotated[dict[str, Any], Meta()] = field(default_factory=dict)
-    """What shall differ of `MpcSettings`."""
+    """Values of `MpcSettings` that differ from its defaults."""
     timeout: Positive = DEAD_MAN_TIME
     """Age from which an observation is stale [s]."""
     clock: Callable[[], float] = field(default=time.monotonic, repr=False)

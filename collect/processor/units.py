@@ -1,4 +1,4 @@
-"""What a robot of LeRobot's calls its joints, and in which units: from its numbers to ours, and back."""
+"""Names and units of the joints of a robot of LeRobot's: from its numbers to ours, and back."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +34,7 @@ class JointUnits:
     zero: Number = 0.0
     """The value at `q₀`."""
     sends: Literal["position", "velocity"] = "position"
-    """What the robot takes."""
+    """The kind of command that the robot takes."""
 
     def terms(self, lower: float, upper: float) -> tuple[float, float]:
         """Return `sign · s` and q₀ of a joint between limits."""
@@ -106,7 +106,7 @@ class UnitsTable:
 
 
 class BodyReading(NamedTuple):
-    """What an observation says [m, rad]: joints, (n − b,); base's twist and pose, (3,); openings, (h,)."""
+    """The state in an observation [m, rad]: joints, (n − b,); base's twist and pose, (3,); openings, (h,)."""
 
     arm: FloatArray
     twist: FloatArray

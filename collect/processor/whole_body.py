@@ -91,7 +91,7 @@ class WholeBody:
 
     @property
     def velocity(self) -> FloatArray:
-        """What was sent last, (n,)."""
+        """The command sent last, (n,)."""
         return self._gate.velocity
 
     @property

@@ -1,4 +1,4 @@
-"""What disturbs an episode: late observations, other pictures, pushes, a start elsewhere."""
+"""Disturbances at work in an episode: late observations, other pictures, pushes, a start elsewhere."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -155,7 +155,7 @@ def sample_shifted(task: Task, size: float, model: RobotModel, rng: np.random.Ge
     """Draw a task's beginning, then where the robot is instead; scene and goal of a seed stay what they are.
 
     With size s the base begins `s/2` to s metres away in any direction and turned by up to s rad, each joint
-    of the arm by up to `s/2` rad. What the gripper holds comes along, and the arm then stays as it is. The
+    of the arm by up to `s/2` rad. A held object comes along, and the arm then stays as it is. The
     start is inside the limits and keeps 8 cm from everything; where there is no room the shift becomes
     smaller.
 

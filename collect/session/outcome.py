@@ -48,7 +48,7 @@ class Outcome:
     started: float
     """Unix time at its beginning [s]."""
     ended_by: EpisodeEvent | None = None
-    """What the operator said to end it; None where the task was the judge."""
+    """The operator's word that ended it; None where the task was the judge."""
     undos: int = 0
     """How often the operator went back to an earlier moment."""
     practice: bool = False
@@ -56,7 +56,7 @@ class Outcome:
 
     @property
     def operator_says(self) -> str:
-        """What the operator said of it: success, failure, or nothing."""
+        """The operator's judgement: success, failure, or none."""
         return str(self.ended_by) if self.ended_by and self.ended_by.judges else ""
 
     @property

@@ -1,4 +1,4 @@
-"""What may disturb an episode: pushes, a start elsewhere, late observations, other pictures. Light to import.
+"""Disturbances of an episode: pushes, a start elsewhere, late observations, other pictures. Light to import.
 
 All of it is drawn from the episode's seed and from nothing that the robot does, so that whoever runs the same
 seed meets the same disturbance.
@@ -64,7 +64,7 @@ class Perturbation:
 
     @property
     def sizes(self) -> dict[str, float]:
-        """What disturbs, with its size."""
+        """The disturbance, with its size."""
         return {name: float(getattr(self, name)) for name in DEFAULTS if getattr(self, name)}
 
     @property
@@ -74,7 +74,7 @@ class Perturbation:
 
     @property
     def words(self) -> str:
-        """What an arm is called under it, such as `pushed delayed:5`; usual sizes are not said."""
+        """The name of an arm under it, such as `pushed delayed:5`; usual sizes are not said."""
         return " ".join(
             _WORDS[name] + ("" if size == DEFAULTS[name] else f":{size:g}")
             for name, size in self.sizes.items()

@@ -17,7 +17,7 @@ OUTCOME = (
     *("success", "failure_reason", "seed", "started", "wall_time", "brakes", "late", "undos"),
     *("contact_onsets", "contact_periods"),
 )
-"""What an episode's metadata says of its outcome."""
+"""The outcome in an episode's metadata."""
 
 
 class _Aside:

@@ -69,7 +69,7 @@ class StudyFolder:
         if self._written.exists() and self._content() != frozen.study:
             raise HandrailError(
                 f"study {self._written}: it was changed after {frozen.frozen}, when the first participant"
-                f" began: expected what {self._frozen.name} says; put it back, or begin a new folder"
+                f" began: expected the text of {self._frozen.name}; put it back, or begin a new folder"
             )
         return decoded(frozen.study, UserStudy, f"study {self._frozen}")
 

@@ -43,8 +43,8 @@ def pairs_form(rng: np.random.Generator) -> Form:
         pair = PAIRS[index]
         sides = pair if rng.random() < 0.5 else pair[::-1]
         items.append(Item("_".join(pair), "pair", "", choices=tuple((name, titles[name]) for name in sides)))
-    text = "Of each pair, choose what contributed more to the workload of the tasks that you have just done."
-    return Form(TLX_PAIRS, "What contributed more? (NASA-TLX)", text, tuple(items))
+    text = "Choose the one of each pair that contributed more to the workload of the tasks just done."
+    return Form(TLX_PAIRS, "Which contributed more? (NASA-TLX)", text, tuple(items))
 
 
 def sus_form() -> Form:

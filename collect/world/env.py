@@ -31,8 +31,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A robot does a task.
 
     Action, (n + h,) float32: the generalised velocities that the robot shall have at the end of the step
-    [m/s, rad/s], reached linearly from those commanded before, and each gripper (0 open, 1 closed). What is
-    sent is inside the robot's limits; an action that is not finite brakes.
+    [m/s, rad/s], reached linearly from those commanded before, and each gripper (0 open, 1 closed). The sent
+    command is inside the robot's limits; an action that is not finite brakes.
 
     Args:
         task: a `Task`, or the name of its class as `module:Class`.

@@ -16,7 +16,7 @@ _CELLS = (2, 4, 8, 16, 32)  # of the floor's pattern along a metre
 
 @dataclass(frozen=True)
 class Looks:
-    """What is drawn for an episode."""
+    """The colours, lights and cameras of an episode."""
 
     randomise: bool = False
     """Whether light, colours, textures, and the cameras' poses and fields of view are others."""

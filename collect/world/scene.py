@@ -88,7 +88,7 @@ class SceneObject(FrozenArrays):
 
     name: str
     shape: Shape
-    """What the controller avoids; encloses the parts."""
+    """The shape that the controller avoids; encloses the parts."""
     position: FloatArray
     """Of its centre in the world [m], (3,)."""
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
@@ -101,7 +101,7 @@ class SceneObject(FrozenArrays):
     ghost: bool = False
     """Drawn, never touched: a marker."""
     parts: tuple[Part, ...] = ()
-    """What is drawn and touched, if not the shape itself."""
+    """The shapes that are drawn and touched, if not the shape itself."""
     friction: float = 0.8
     patrol: Patrol | None = None
     """How it moves by itself, from `position` on; nothing stops it."""
@@ -137,7 +137,7 @@ class SceneObject(FrozenArrays):
 
     @property
     def solids(self) -> tuple[Part, ...]:
-        """What is drawn and touched."""
+        """The shapes that are drawn and touched."""
         return self.parts or (Part(self.shape, np.zeros(3)),)
 
     def carried(self, tool: Pose, now: Pose, frame: str = "tool") -> Obstacle:

@@ -1,4 +1,4 @@
-"""What a task is: it samples an episode, names its state, and judges the outcome; what tasks share."""
+"""The interface of a task (samples an episode, names its state, judges the outcome); shared parts."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
@@ -68,7 +68,7 @@ class TaskState:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """What the robot must not touch, where it is now."""
+        """The things that the robot must not touch, where they are now."""
         return self.start.scene.obstacles(self.time)
 
     def left_alone(self, held: Pose, middle: FloatArray, apart: float) -> bool:

@@ -1,4 +1,4 @@
-"""What a controller keeps from: the robot's pairs of shapes among what stands around now, and how far."""
+"""The surroundings of a controller: pairs of the robot's shapes and obstacles, and their distances."""
 
 from dataclasses import dataclass, replace
 from typing import Self

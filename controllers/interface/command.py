@@ -1,4 +1,4 @@
-"""What a controller sends to the robot, and how it fared."""
+"""A controller's command to the robot, and its diagnostics."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -47,5 +47,5 @@ class Command(Trajectory):
     grippers: tuple[float, ...] = (0.0,)  # of each hand: 0 open, 1 closed; NaN, as it is, until it is asked
     diagnostics: Diagnostics = field(default_factory=Diagnostics)  # how the controller fared
     plan: Trajectory | None = None
-    """What the controller intends beyond what it has certified, to be shown; None where it has no plan.
+    """The plan beyond its certified part, to be shown; None where it has no plan.
     The robot is not sent it."""

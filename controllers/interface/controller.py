@@ -14,7 +14,7 @@ from handrail.controllers.robot.shape import Obstacle
 
 @dataclass(frozen=True)
 class State:
-    """What is known of the robot at a time."""
+    """The known state of the robot at a time."""
 
     q: FloatArray  # measured positions, (n,) [m, rad]
     v: FloatArray  # measured velocities, dq/dt, (n,) [m/s, rad/s]

@@ -1,4 +1,4 @@
-"""What the operator asks for: values on channels, and a mask of those that are commanded."""
+"""The operator's intent: values on channels, and a mask of those that are commanded."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ _HALF = 0.5  # a gripper command beyond it closes
 
 @dataclass(frozen=True)
 class RawInput:
-    """What the input device read, before it became a command."""
+    """The input device's reading, before it became a command."""
 
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
     """Deflection of each input from −1 to 1, or a leader arm's joint angles [rad], by channel, (m,); (0,)

@@ -95,7 +95,7 @@ class Bounded:
 
 @dataclass(frozen=True)
 class Level:
-    """What a low-pass remembers: when an intent came last [s], its command and the level then, (m,)."""
+    """The memory of a low-pass: when an intent came last [s], its command and the level then, (m,)."""
 
     time: float
     command: FloatArray

@@ -59,7 +59,7 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class Intents(Intent):
-    """What several sources ask for, as one intent.
+    """The intents of several sources, as one intent.
 
     With `W = Σ_s w_s M_s` the tracking terms are one, `Σ_s w_s ‖M_s (c - û_s)‖² = W (c - ū)² + const` with
     `ū = Σ_s w_s M_s û_s / W`, channel by channel. `values` is ū, `mask` is W > 0, `time` the oldest of all:
@@ -133,7 +133,7 @@ def _fits(source: IntentSource, base: Intent) -> bool:
 class OfSources:
     """Ψ of several sources: the weighted mean of each one's own prediction, cut to what is possible first.
 
-    Of a plain intent it is the controller's Ψ. What that remembers of a source begins when it first asks.
+    Of a plain intent it is the controller's Ψ. Its memory of a source begins when that first asks.
     """
 
     predict: Prediction  # the controller's Ψ

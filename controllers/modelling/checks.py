@@ -1,4 +1,4 @@
-"""What is wrong with a robot's description, one line each."""
+"""Faults of a robot's description, one line each."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a robot's links fill: the triangles of their collision meshes, else of their visual ones."""
+"""The space that a robot's links fill: the triangles of their collision meshes, else of their visual ones."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -21,7 +21,7 @@ _TRIES = 300  # distances that are measured on the way to a meeting
 
 
 class Meetings:
-    """What becomes of all pairs of shapes on bodies that are no neighbours, and of the meshes in them.
+    """Statistics of all pairs of shapes on bodies that are no neighbours, and of the meshes in them.
 
     In K configurations: random ones, then for each pair that did not meet there one that brings it nearer.
 

@@ -1,4 +1,4 @@
-"""What a robot stands on, how large its world is, and from where its cameras look."""
+"""A robot's floor, the size of its world, and the places of its cameras."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What lasts from one update of the masked MPC to the next, as one value."""
+"""The state that the masked MPC keeps from one update to the next, as one value."""
 
 import math
 from typing import NamedTuple

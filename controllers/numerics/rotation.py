@@ -1,6 +1,6 @@
 """Rotations: matrices, quaternions (wxyz), rotation vectors.
 
-What is asked many times in a control period is in the compiled core: for
+Functions called many times in a control period are in the compiled core: for
 one matrix SciPy's own functions take most of their time to check it.
 """
 

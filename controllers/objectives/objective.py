@@ -1,4 +1,4 @@
-"""What an objective is: a residual of one stage, written once as a CasADi expression."""
+"""The interface of an objective: a residual of one stage, written once as a CasADi expression."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

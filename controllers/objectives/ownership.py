@@ -1,4 +1,4 @@
-"""What a mask leaves to the robot: objectives rest where the operator owns what they act through."""
+"""The freedom that a mask leaves: objectives rest where the operator owns what they act through."""
 
 import numpy as np
 

@@ -45,7 +45,7 @@ class MpcSettings:
     it, relative to the velocity limit; more than the measured velocity's noise."""
 
     length: Positive = 1.0
-    """What weighs as much as one radian [m]: weights of translations are divided by its square."""
+    """The length that weighs as much as one radian [m]: weights of translations are divided by its square."""
 
     @classmethod
     def of(cls, scale: float, **values: float) -> Self:

@@ -161,7 +161,7 @@ class Gripper:
 
 @dataclass(frozen=True)
 class Arm:
-    """What a URDF describes of a robot: an arm, or several with torso and head."""
+    """The part of a robot that a URDF describes: an arm, or several with torso and head."""
 
     urdf: Path
     mesh_root: Path  # where its `package://` paths start from
@@ -187,7 +187,7 @@ class EndEffector:
 
 @dataclass(frozen=True)
 class Base:
-    """What the arm stands on: planar or fixed, its mass [kg], height, length and width [m]."""
+    """The arm's base: planar or fixed, its mass [kg], height, length and width [m]."""
 
     kind: Literal["planar", "fixed"]
     mass: Positive

@@ -16,7 +16,7 @@ _UNEVEN = 0.05  # how far a floor may rise above the base's [m]
 
 @dataclass(frozen=True)
 class _Height:
-    """What is known of the height of a joint's origin at every configuration."""
+    """Bounds on the height of a joint's origin at every configuration."""
 
     lowest: float  # bound on it [m]
     up: FloatArray | None

@@ -74,7 +74,7 @@ class Obstacle:
 
     @property
     def kept(self) -> tuple[object, ...]:
-        """What stays the same while it moves."""
+        """The properties that stay the same while it moves."""
         return self.name, self.frame, self.shape.kind, self.shape.size.tobytes(), self.work_surface
 
 

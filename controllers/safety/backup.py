@@ -38,7 +38,7 @@ class Backup(NamedTuple):
 
     1. The new plan's first stage and a full stop from its end.
     2. The whole new plan and a full stop from its end; or as far as that is safe, half as far, and so on.
-    3. What it follows already; only if its velocity is that: not when it was held back.
+    3. The plan that it follows already; only if its velocity is that plan's: not when it was held back.
     4. A full stop at once.
 
     An operator who is gone or talks nonsense has no plan, and wants 4 before 3. Where no way is safe,

@@ -48,7 +48,7 @@ _OPTIONS = {
 
 
 class Evaluation(NamedTuple):
-    """What a motion costs, exactly, nothing linearised."""
+    """The exact cost of a motion, nothing linearised."""
 
     tracking: float  # weighted squared errors of all objectives
     slack: FloatArray  # the least σ that do, (4,)

@@ -1,4 +1,4 @@
-"""What was collected: how many episodes, in how much of an operator's time, and what that time yields."""
+"""The collected data: how many episodes, in how much of an operator's time, and the yield of that time."""
 
 from collections.abc import Sequence
 from typing import Any

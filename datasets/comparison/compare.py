@@ -66,7 +66,7 @@ class Comparison:
 
     @property
     def unlike(self) -> tuple[str, ...]:
-        """What differs so that nothing is ranked: tasks, robots."""
+        """The differences for which nothing is ranked: tasks, robots."""
         return unlike(self.everything.groups)
 
     @property

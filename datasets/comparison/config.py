@@ -26,7 +26,7 @@ class CompareConfig:
     labels: Words = ()
     """A name for each dataset; the folders' names when empty."""
     baseline: str = ""
-    """What the others are compared with; the first when empty."""
+    """The dataset that the others are compared with; the first when empty."""
     evaluations: Words = ()
     """JSON files of what policies trained on the datasets did."""
     success_only: bool = False

@@ -1,4 +1,4 @@
-"""What policies trained on the datasets did, read from JSON files; the schema is below.
+"""Evaluations of policies trained on the datasets, read from JSON files; the schema is below.
 
     {
       "format": "handrail.evaluations/1",
@@ -44,7 +44,7 @@ OUTCOMES: Mapping[str, Callable[[Rollout], float]] = {
     "contact": lambda row: row.get("contacts", 0) > 0,
     "clean": lambda row: row[SUCCESS] and not row.get("contacts", 0) > 0,
 }
-"""What follows from what a rollout's line says."""
+"""Measures derived from a rollout's line."""
 
 
 class _Rollout(msgspec.Struct):

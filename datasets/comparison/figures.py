@@ -1,6 +1,6 @@
 """The figures of the page: the answer, how metrics differ and every episode, where the motion went.
 
-What is better is always right.
+Better is always right.
 """
 
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def draw_values(
         axes: Of matplotlib.
         values: One a row.
         styles: How each is drawn: its color, perhaps its marker and label.
-        scale: What the numbers are multiplied with.
+        scale: The factor of the numbers.
     """
     for row, (each, style) in enumerate(zip(values, styles, strict=True)):
         if each.estimate is None:

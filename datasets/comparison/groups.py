@@ -1,4 +1,4 @@
-"""What is compared: whole datasets, or the episodes of datasets by a column of their metadata."""
+"""The compared groups: whole datasets, or the episodes of datasets by a column of their metadata."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ class Group:
 
     @property
     def content(self) -> dict[str, Any]:
-        """What was collected: the entry in the JSON of the report."""
+        """The group's data: the entry in the JSON of the report."""
         failed = (episode for episode in self.episodes if episode.success is False)
         reasons = Counter(str(each.meta.get("failure_reason") or "not recorded") for each in failed)
         return {

@@ -17,7 +17,7 @@ def headline(comparison: Comparison) -> str:
     """Return the answer: of the policies if they were evaluated, else of what was collected."""
     if comparison.unlike:
         differing = " and the ".join(comparison.unlike)
-        return f"The {differing} differ: what follows describes each group and ranks nothing."
+        return f"The {differing} differ: each group is described, none is ranked."
     outcomes = comparison.outcomes
     told = _of_policies(outcomes) if outcomes else _of_collecting(comparison)
     return " ".join(islice(dict.fromkeys(told), _MOST))

@@ -69,11 +69,11 @@ def dataset_report(comparison: Comparison) -> Report:
         ],
         sections=[
             ("Policies", policies),
-            ("What was collected", collecting),
+            ("Collected data", collecting),
             ("Quality", _quality(comparison)),
             ("Trajectories", [_drawn(figures.trajectory_panels(comparison)), _pictures(comparison)]),
             ("Episodes to look at first", [markup.paragraph(_SLOWEST, "quiet"), *_worst(comparison)]),
-            ("What does not apply, or is not comparable", [missing] if missing.rows else []),
+            ("Not applicable, or not comparable", [missing] if missing.rows else []),
         ],
         how=_HOW,
         values=comparison.values,

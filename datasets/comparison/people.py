@@ -129,7 +129,7 @@ def compared(
         trials: Of the task.
         labels: Of the conditions under which people drove.
         baseline: The condition that the others are compared with.
-        participants: Who there is.
+        participants: All participants.
         rng: Of resampling and permutation.
     """
     scripted = list(dict.fromkeys(each.condition for each in trials if not each.participant))

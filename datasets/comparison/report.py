@@ -1,4 +1,4 @@
-"""What every comparison shows and writes: a table of contrasts, and a report as page, JSON and CSV."""
+"""The output of every comparison: a table of contrasts, and a report as page, JSON and CSV."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -49,11 +49,11 @@ def values_table(
     """Return a row a measure, a column a condition; then rows of texts by label.
 
     Args:
-        values: What is shown.
+        values: The numbers shown.
         title: Above the table.
         caption: Below it.
         rows: More, by heading.
-        note: What stands below a value, beside its interval.
+        note: The text below a value, beside its interval.
     """
     labels = list(dict.fromkeys(each.label for each in values))
     cells = {(each.measure.name, each.label): shown(each, note(each)) for each in values}
@@ -168,7 +168,7 @@ class Report:
         parts = [paragraph(self.headline, "headline") if self.headline else "", *self.first]
         parts += [section("Read this first", cautions) if self.cautions else ""]
         parts += [section(title, *shown) for title, shown in self.sections if any(shown)]
-        told = [paragraph(self.how), folded("What every measure means", meanings) if measures else ""]
+        told = [paragraph(self.how), folded("The meaning of every measure", meanings) if measures else ""]
         return page(self.title, *parts, section("How to read this", *told), what=self.what)
 
     @property

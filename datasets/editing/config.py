@@ -16,7 +16,7 @@ MANY = 500  # episodes in files of their own
 
 @dataclass(frozen=True, kw_only=True)
 class EditConfig:
-    """What all of these verbs need."""
+    """Settings that all of these verbs need."""
 
     verb: ClassVar[str]
     needed: ClassVar[tuple[str, ...]] = ()

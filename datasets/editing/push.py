@@ -1,6 +1,6 @@
 """Sending a dataset, to the hub with LeRobot's own upload or to a store: only when asked, and what may leave.
 
-What goes is LeRobot's dataset and the card. `.damaged/`, `.handrail/` and whatever else lies in the folder
+LeRobot's dataset and the card are sent. `.damaged/`, `.handrail/` and all else that lies in the folder
 stay, and episodes of a user study's participants are not sent at all.
 """
 
@@ -43,7 +43,7 @@ _MARK = "<!-- written by handrail-edit push -->"
 _COUNTED = ("environment", "robot", "operator", "mode")
 _NOTES = (
     "The operator steered a part of the motion (`teleop.mode`, `teleop.mask`); a controller completed the"
-    " rest. `action` is what was sent to the robot. Handrail's `docs/recording.md` explains every column."
+    " rest. `action` is the command sent to the robot. Handrail's `docs/recording.md` explains every column."
 )
 
 

@@ -54,7 +54,7 @@ class ForeignRowError(HandrailError):
 
 
 class EpisodeRow(msgspec.Struct, kw_only=True):
-    """What a row of `meta/episodes` says of any dataset's episode."""
+    """A row of `meta/episodes` in any dataset."""
 
     episode_index: Frames
     length: Frames
@@ -64,7 +64,7 @@ class EpisodeRow(msgspec.Struct, kw_only=True):
 
 
 class _SavedRow(EpisodeRow, kw_only=True):
-    """What it says of an episode that Handrail saved."""
+    """A row of an episode that Handrail saved."""
 
     dataset_from_index: Frames
     tasks: list[str] = msgspec.field()
@@ -87,7 +87,7 @@ class EpisodeRows:
     files: Mapping[str, Checksum]
     """Checksums of the group's data and video files by relative path."""
     totals: Totals | None
-    """What all episodes up to the last one here add up to; None where that was not kept."""
+    """The totals of all episodes up to the last one here; None where they were not kept."""
     table: pa.Table | None
     """All columns, where they were read at once."""
 
@@ -209,7 +209,7 @@ def rows_bytes(
         manifest: The schema.
         records: The episodes, with statistics.
         types: Of the extra columns.
-        totals: What all episodes up to the last one add up to; kept for a group of many.
+        totals: The totals of all episodes up to the last one; kept for a group of many.
     """
     columns = {
         "episode_index": _whole([record.episode for record in records]),

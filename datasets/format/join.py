@@ -45,7 +45,7 @@ class Videos:
             path: An mp4.
             first: The picture that it begins with.
             count: Number of pictures.
-            camera: Whose last video stays open until the next.
+            camera: The camera; its last video stays open until the next.
         """
         with whole_mp4(path):
             if camera not in self._open or self._open[camera][0] != path:

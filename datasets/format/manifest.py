@@ -32,7 +32,7 @@ class _ManifestFile(msgspec.Struct):
 
 @dataclass(frozen=True)
 class Manifest:
-    """What every episode of a dataset has in common."""
+    """The properties that every episode of a dataset shares."""
 
     repo_id: str
     """The name, `owner/name`."""

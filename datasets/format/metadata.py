@@ -1,4 +1,4 @@
-"""What a dataset knows about its episodes: one row of metadata an episode, and what they add up to.
+"""A dataset's metadata of its episodes: one row an episode, and their totals.
 
 Beside LeRobot's own, a row has extra columns: success, operator, seed and whatever else a session knows. The
 first saved episode fixes which there are and their types: one parquet schema for all episodes. Strings are
@@ -70,7 +70,7 @@ class EpisodeRecord:
 
 @dataclass(frozen=True)
 class Totals:
-    """What the episodes add up to."""
+    """The totals of the episodes."""
 
     episodes: int = 0
     frames: int = 0
@@ -121,7 +121,7 @@ def fit_columns(columns: Mapping[str, Scalar | None], types: ColumnTypes) -> dic
 
     Args:
         columns: Plain values.
-        types: What the first episode fixed.
+        types: Types that the first episode fixed.
     """
     if unknown := [name for name in columns if name not in types]:
         raise HandrailError(

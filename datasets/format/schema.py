@@ -1,4 +1,4 @@
-"""What one frame of a dataset holds: named features, and the check that a frame fits them.
+"""The schema of one frame of a dataset: named features, and the check that a frame fits them.
 
 Keys that begin `observation` or `action` become inputs and outputs of a LeRobot policy and must be finite;
 anything else (`teleop.*`, `controller.*`, …) is kept beside them.

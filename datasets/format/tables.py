@@ -17,7 +17,7 @@ from handrail.controllers.regular_file import regular
 from handrail.datasets.format.schema import AUTOMATIC, Feature
 
 UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError, OverflowError)
-"""What reading a file of a dataset can raise."""
+"""The errors that reading a file of a dataset can raise."""
 _INDEX = {"name": None, "field_name": None, "pandas_type": "unicode", "numpy_type": "object"}
 _PANDAS_TASKS = {
     "index_columns": ["task"],

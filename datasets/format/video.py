@@ -90,7 +90,7 @@ def decoded_stats(path: Path, frames: int, camera: Feature, first: int = 0, fps:
     Args:
         path: The mp4.
         frames: Number of pictures.
-        camera: Whose pictures they are.
+        camera: The camera of the pictures.
         first: The picture that the stretch begins with.
         fps: Pictures a second [Hz]; 0 if these must be all pictures of the file.
     """

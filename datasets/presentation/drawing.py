@@ -1,4 +1,4 @@
-"""What all figures share: colours that everybody can tell apart, quiet axes, and SVG inside the page."""
+"""Shared by all figures: colours that everybody can tell apart, quiet axes, and SVG inside the page."""
 
 import base64
 import io
@@ -23,9 +23,9 @@ INK, GREY, FAINT = "#1d2733", "#8a94a0", "#e3e7ec"
 
 @dataclass(frozen=True)
 class Panel:
-    """A figure of one pair of axes. What it is called stands beside it in the page, which breaks lines."""
+    """A figure of one pair of axes. Its title stands beside it in the page, which breaks lines."""
 
-    title: str  # What it shows
+    title: str  # One line
     figure: Any  # Of matplotlib, without a title
     note: str = ""  # How to read it
 

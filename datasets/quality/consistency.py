@@ -34,7 +34,7 @@ def state_coverage(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
 
 @metric("nat", "higher", "scale", "mutual information", of_dataset=True)
 def information(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
-    """What the state says about the action (DemInf): varied and predictable at once."""
+    """Mutual information of state and action (DemInf): actions varied and predictable at once."""
     states = dataset.points("observation", _COMPONENTS)
     return mutual_information(states, dataset.points("relative_action", _COMPONENTS), rng)
 

@@ -16,7 +16,7 @@ class Metric(Measure):
     measure: Callable[..., Any]
     """Of an episode `(Demonstration, Scale) -> float`; of a dataset `(EpisodeSet, rng) -> (N,)` frames."""
     needs: Needs = ""
-    """What its unit hangs on, see `units.why_not`: "" for nothing."""
+    """The columns that its unit depends on, see `units.why_not`: "" for none."""
     of_dataset: bool = False
     """Whether an episode's value depends on the others, on their number and on neighbours that they share."""
 

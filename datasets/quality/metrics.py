@@ -119,8 +119,8 @@ def corrections(
     It is on where `|commanded − asked| > tolerance` on any owned channel, and off before the first sample.
 
     Args:
-        asked: What the operator asked for, `(N, d)`.
-        commanded: What was sent on the same channels, `(N, d)`.
+        asked: The operator's intent, `(N, d)`.
+        commanded: The command sent on the same channels, `(N, d)`.
         owned: Where the operator owned a channel, `(N, d)`; elsewhere nothing was asked.
         tolerance: Largest difference that is no correction.
     """

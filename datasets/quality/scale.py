@@ -1,4 +1,4 @@
-"""What compared datasets have in common: one scale for all, so that their numbers can be compared.
+"""The scale of compared datasets: one for all, so that their numbers can be compared.
 
 Episodes come one after the other and need not stay: sums, ranges and scatter are all that is kept of them.
 """

@@ -1,6 +1,6 @@
 """Whether numbers of two groups are in the same unit, as far as their datasets tell; if nobody knows, no.
 
-LeRobot's format names no units. What tells: that it is one dataset; that Handrail recorded both (metres,
+LeRobot's format names no units. Evidence: that it is one dataset; that Handrail recorded both (metres,
 radians, seconds); else the same robot, the same names that say what they measure, the same rate and numbers
 of the same size, all of these.
 """

@@ -66,7 +66,7 @@ class Episode(ABC):
 
 @dataclass(frozen=True)
 class Demonstration(Episode):
-    """One episode with its rows. What it does not hold raises `DoesNotApply` with the reason."""
+    """One episode with its rows. A column that it lacks raises `DoesNotApply` with the reason."""
 
     number: int
     info: DatasetInfo
@@ -100,7 +100,7 @@ class Demonstration(Episode):
 
     @cached_property
     def motion(self) -> FloatArray:
-        """What moves: the tools' positions, `(N, 3 h)` [m], or else the configuration, in the state's units.
+        """The motion: the tools' positions, `(N, 3 h)` [m], or else the configuration, in the state's units.
 
         Of h hands one after the other.
         """
@@ -127,7 +127,7 @@ class Demonstration(Episode):
 
     @cached_property
     def observation(self) -> FloatArray:
-        """What a policy reads, pictures aside: all numbers under `observation.`, `(N, s)`."""
+        """The input of a policy, pictures aside: all numbers under `observation.`, `(N, s)`."""
         known = [values for name, values in self.frames.items() if name.startswith("observation")]
         found = [_rows(values) for values in known if values.dtype.kind in "fiub"]
         if not found:
@@ -149,7 +149,7 @@ class Demonstration(Episode):
 
     @cached_property
     def reached(self) -> FloatArray:
-        """What the state measured of `commanded`, `(N, p)`."""
+        """The measured state of `commanded`, `(N, p)`."""
         return self.matrix("state")[:, [place for _, place in self.pairs]]
 
     @cached_property
@@ -163,7 +163,7 @@ class Demonstration(Episode):
 
     @cached_property
     def grippers(self) -> FloatArray:
-        """What opens and closes the gripper of each hand, commanded or else measured, `(N, h)`."""
+        """The opening of each hand's gripper, commanded or else measured, `(N, h)`."""
         for part in ("action", "state"):
             if places := gripper_entries(self.entries(part), self.hand):
                 return self.matrix(part)[:, places]
@@ -178,7 +178,7 @@ class Demonstration(Episode):
 
     @cached_property
     def inputs(self) -> FloatArray:
-        """What the operator put in, zero on axes not owned and without the gripper, `(N, u)`."""
+        """The operator's input, zero on axes not owned and without the gripper, `(N, u)`."""
         values = self.matrix("asked")
         owned = self.matrix("owned")[:, : values.shape[1]] if self.has("owned") else np.empty(0)
         if owned.shape == values.shape:  # those of the grippers come after the channels

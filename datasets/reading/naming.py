@@ -1,4 +1,4 @@
-"""What the names of a column's entries say: which are a point in space, which mean the same.
+"""The meaning of the names of a column's entries: which are a point in space, which mean the same.
 
 With several hands the names of what is a hand's begin with its own: `left.tool.x`, `left_gripper.pos`.
 """

@@ -55,7 +55,7 @@ def check_target(layout: Layout, overwrite: bool) -> None:
     check_folders(layout)
     if foreign := foreign_files(layout):
         raise HandrailError(
-            f"dataset {str(root)!r}: found what Handrail did not write, {shortened(foreign, ', ')};"
+            f"dataset {str(root)!r}: found files that Handrail did not write, {shortened(foreign, ', ')};"
             " --overwrite removes only its own files: move this away, or choose another root"
         )
 

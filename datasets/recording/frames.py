@@ -28,7 +28,7 @@ class Frame:
     images: dict[str, np.ndarray]  # pictures by camera, (height, width, 3) uint8 each
     intent: Intent  # what the operator asked for
     action: FloatArray
-    """What was sent to the robot: velocities at the end of the period and grippers, (n + h,)."""
+    """The command sent to the robot: velocities at the end of the period and grippers, (n + h,)."""
     command: FloatArray  # what the controller asked for, (n + h,); the robot's own limits may have cut it
     diagnostics: Diagnostics  # of the controller
     contacts: int  # forbidden contacts in the period
@@ -80,7 +80,7 @@ COLUMNS = (
     Column("next.done", "bool", lambda frame: frame.done),
     Column("wall_clock", "float64", lambda frame: frame.wall_clock),
 )
-"""What is recorded of every moment, beside the pictures: one line a column.
+"""The recorded columns of every moment, beside the pictures: one line a column.
 
 Policies read `observation.*` and write `action`; LeRobot leaves the rest alone.
 All numbers are finite: no tool's statistics may become NaN.
@@ -94,7 +94,7 @@ SHARED_COLUMNS = (
     Column("policy.values", "float32", lambda frame: _asked(_of_policy(frame.intent)), "asked"),
     Column("policy.age", "float32", lambda frame: _finite_number(_of_policy(frame.intent).raw.age)),
 )
-"""What is recorded besides where a policy steers beside a person."""
+"""Further columns, where a policy steers beside a person."""
 PICTURE = "observation.images."
 
 

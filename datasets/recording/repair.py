@@ -1,8 +1,8 @@
 """Bringing a dataset that Handrail wrote into order, without losing an episode that was saved.
 
-Whatever was saved stays where it is: an episode that is not whole is named, and kept in `.damaged/` only when
-asked (`set_aside`), whereupon those after it move up. What a crash leaves behind (staged files, the published
-files of the one episode that was never saved) is removed. `info.json`, `stats.json` and `tasks.parquet` are
+A saved episode stays where it is: an episode that is not whole is named, and kept in `.damaged/` only when
+asked (`set_aside`), whereupon those after it move up. The remains of a crash (staged files, the published
+files of the one episode that was never saved) are removed. `info.json`, `stats.json` and `tasks.parquet` are
 rebuilt if they are not, to the byte, what the episodes say.
 
     handrail-edit repair path/to/dataset
@@ -34,7 +34,7 @@ REBUILT = "written anew"  # summary files
 
 @dataclass(frozen=True)
 class RepairReport:
-    """What a repair found and did; printing it gives one line."""
+    """The findings and changes of a repair; printing it gives one line."""
 
     root: Path
     episodes: int

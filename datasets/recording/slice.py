@@ -70,7 +70,7 @@ class EpisodeSlice:
         Args:
             schema: Of the data files of both datasets.
             fps: Frames a second [Hz].
-            totals: What the episodes before it add up to.
+            totals: The totals of the episodes before it.
             files: Opens the file of the rows.
         """
         whole = files.open(self.data).rows(self.record.episode)

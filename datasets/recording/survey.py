@@ -1,4 +1,4 @@
-"""What lies in the folder of a dataset that Handrail wrote: its episodes, whole or not, and the rest.
+"""The content of the folder of a dataset that Handrail wrote: its episodes, whole or not, and the rest.
 
 A file with the checksum that it had when it was saved is whole. One with another was rewritten, by LeRobot's
 `reencode_videos` for instance, or is damaged: it is whole if it still decodes to the episode's frames.
@@ -27,7 +27,7 @@ _GAP = 10_000  # episodes; more that nothing is left of are a number made up
 
 @dataclass(frozen=True)
 class GroupState:
-    """What became of the episodes that share their files."""
+    """The state of the episodes that share their files."""
 
     first: int
     """Number of the first episode."""
@@ -39,12 +39,12 @@ class GroupState:
 
 @dataclass(frozen=True)
 class Survey:
-    """What was found; `check` and `repair` read it."""
+    """The findings; `check` and `repair` read it."""
 
     layout: Layout
     groups: Sequence[GroupState]
     totals: Totals
-    """What the episodes before the first one without a row of metadata add up to."""
+    """The totals of the episodes before the first one without a row of metadata."""
     leftovers: tuple[Path, ...]
     """Files of the one episode that a crash cut short before it was saved."""
     unknown: tuple[Path, ...]
@@ -57,7 +57,7 @@ class Survey:
 
     @property
     def damage(self) -> tuple[str, ...]:
-        """What is wrong, one text an episode."""
+        """The faults, one text an episode."""
         faults = [each for group in self.groups for each in enumerate(group.faults, group.first)]
         return tuple(f"episode {number}: {fault}" for number, fault in faults if fault)
 

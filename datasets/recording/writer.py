@@ -157,7 +157,7 @@ class EpisodeWriter:
 
         Args:
             frame: A value for every feature, copied; see `schema.check_frame`.
-            task: What is being done, in words.
+            task: The task, in words.
         """
         self._check_usable()
         self._episode.add(frame, task)

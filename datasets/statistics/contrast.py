@@ -90,7 +90,7 @@ class Value(Estimate):
 
     @property
     def named(self) -> dict[str, Any]:
-        """What it is of, for JSON and CSV."""
+        """Its names, for JSON and CSV."""
         names = {"view": self.scope, "metric": self.measure.name, "unit": self.measure.unit}
         return names | {"group": self.label}
 
@@ -149,7 +149,7 @@ class Contrast(Value):
 
     @property
     def row(self) -> dict[str, Any]:
-        """What the CSV of every report has: what is compared, and its numbers, an interval in two columns."""
+        """The row in the CSV of every report: the names and the numbers, an interval in two columns."""
         found = self.named | {"baseline": self.baseline, "does_not_apply": self.reason}
         for name in _OF_CSV:
             value = getattr(self, name)

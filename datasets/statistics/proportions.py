@@ -47,7 +47,7 @@ def paired_shares(
     Args:
         first: `(N,)`.
         second: `(N,)`.
-        scenes: What pairs may have in common, `(N,)`: for the interval and the error those of a scene count
+        scenes: The scene of each pair, `(N,)`: for the interval and the error those of a scene count
             for as many as they are worth, and the test turns them together; None where each is for itself.
     """
     one, other = np.asarray(first, bool), np.asarray(second, bool)
@@ -102,7 +102,7 @@ def unpaired_shares(
     Args:
         first: `(N,)`.
         second: `(M,)`.
-        scenes: What the trials of each may have in common, `(N,)` and `(M,)`, as for `paired_shares`.
+        scenes: The scenes of the trials of each, `(N,)` and `(M,)`, as for `paired_shares`.
     """
     one, other = (int(np.sum(first)), len(first)), (int(np.sum(second)), len(second))
     owners = scenes or (range(one[1]), range(other[1]))

@@ -1,4 +1,4 @@
-"""What a few trained policies say of all that could be trained: Student's and Welch's t over replicates.
+"""From a few trained policies to all that could be trained: Student's and Welch's t over replicates.
 
 A replicate is what was drawn anew: a draw of the dataset with all its policies where there are several, else
 a training seed. Few replicates may agree by chance, so each varies at least as its own rollouts do.

@@ -24,8 +24,8 @@ class DatasetLock:
 
         Args:
             staging: The dataset's staging folder; created if missing.
-            thing: What is locked, in words.
-            holder: Who else may hold it, in words.
+            thing: The locked thing, in words.
+            holder: The program that may hold it, in words.
 
         Raises:
             HeldError: Another process, or another writer in this one, holds it.

@@ -30,7 +30,7 @@ class TrainConfig:
     preset: Literal["cpu", "gpu"] = "cpu"
     """Sizes that learn from the state on two CPU cores, or larger ones for a GPU and images."""
     actions: Literal["realised", "intent", "recorded"] = "realised"
-    """What the policy writes: the joint velocities that came about; the operator's own command, which the
+    """The policy's outputs: the joint velocities that came about; the operator's own command, which the
     controller completes when the policy drives; or `recorded`, all columns as they are in any dataset."""
     base_pose: Advanced[bool] = True
     """Let the policy see where the base is, as operators do who plan where to stand."""

@@ -1,4 +1,4 @@
-"""What the reinforcement-learning policy sees and does: 54 numbers in the base frame, and a base twist."""
+"""Observation and action of the reinforcement-learning policy: 54 numbers in the base frame, a base twist."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ RigidPose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3)
 
 @dataclass(frozen=True)
 class TrackingSituation:
-    """What an observation is made of; poses and twist in the world frame."""
+    """The data of an observation; poses and twist in the world frame."""
 
     q: FloatArray  # generalised coordinates, planar base first, (n,)
     start: FloatArray  # base coordinates at the beginning of the episode, (3,)

@@ -1,4 +1,4 @@
-"""What is compared: the contrasts that were declared before the run, and all others, which only explore."""
+"""Contrasts: those declared before the run, and all others, which only explore."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ def contrasts(results: Results) -> list[Contrast]:
     """Return all contrasts for which there is something: the declared ones first, p adjusted over these.
 
     Nothing is tested before all draws of all of them are there: a look in between that ends a study where it
-    suits finds more. What is not tested has no p.
+    suits finds more. A contrast that is not tested has no p.
     """
     design, tasks = results.progress.design, tuple(results.progress.design.tasks)
     asked = [(each.label, each.parts) for each in declared(design)]

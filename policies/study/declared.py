@@ -1,4 +1,4 @@
-"""What a study declares before it begins: contrasts of its policies, of whatever kind, that are tested."""
+"""The declarations of a study before it begins: contrasts of its policies, of any kind, that are tested."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a study consists of: modes, tasks and draws, as a TOML file says; light to import.
+"""The design of a study: modes, tasks and draws, from a TOML file; light to import.
 
 modes = ["ee", "direct"]        teleop modes; ee_and_leader: the first half of the minutes ee, then leader
 baseline = "direct"             the mode that the others are compared with
@@ -44,8 +44,8 @@ primary = [["whole", "more"]]   pairs of ways, compared after the last round and
 sd = 0.1                        from all data of its way so far. Policies write intents and drive alone.
 
 [rounds.ways.whole]             a way, by its name; attempts that do not fit into the time are left out
-operator = "supervisor"         who records: scripted, or a supervisor of the policy of the round before
-arbiter = "whole"               who owns what while that policy drives; "" if none drives beside the operator
+operator = "supervisor"         the operator: scripted, or a supervisor of the policy of the round before
+arbiter = "whole"               owners of channels beside that policy; "" if none drives beside the operator
 corrections = "weighted"        how corrections are learnt from: all, only or weighted
 
 [robustness]                    optional, exploratory: what else policies go through
@@ -110,7 +110,7 @@ class Beside:
 
 @dataclass(frozen=True)
 class Robustness:
-    """What else policies of the main design go through; explained above."""
+    """Further treatments of policies of the main design; explained above."""
 
     perturbations: tuple[str, ...] = ("push", "shift", "delay")
     protections: tuple[str, ...] = ("filter",)

@@ -16,7 +16,7 @@ from handrail.policies.study.settings import after
 _WIDTH = 10.4  # [inch]
 _Stages = Mapping[tuple[str, str], float]  # by ending of a policy's label and treatment: how far grown
 CAPTIONS = {
-    "contrasts": "What makes a difference: declared, over all tasks (dark), and in each task (grey).",
+    "contrasts": "Differences: declared, over all tasks (dark), and in each task (grey).",
     "answer": "Success of the policies; lines: 95 %, ticks: draws. Round: joint velocities, unprotected;"
     " diamonds: intent through the MPC, policy and controller;"
     " squares: the same number of demonstrations.",

@@ -10,7 +10,7 @@ from handrail.policies.study.design import MIXED, Beside, Rounds, StudyDesign
 
 @dataclass(frozen=True)
 class StudyCell:
-    """What is collected as one dataset: a task in a mode, one draw."""
+    """One dataset: a task in a mode, one draw."""
 
     task: str
     mode: str  # or the way in which the time of a round is spent
@@ -25,7 +25,7 @@ class StudyCell:
 
     @property
     def kind(self) -> str:
-        """What it is, of any task and draw: `ee`, or `whole-2` of the second round."""
+        """Its kind, for any task and draw: `ee`, or `whole-2` of the second round."""
         return f"{self.mode}-{len(self.rounds) - 1}" if self.before else self.mode
 
     @property
@@ -57,7 +57,7 @@ class StudyPolicy:
 
     @property
     def kind(self) -> str:
-        """What tells it from the other policies of its dataset."""
+        """The label that tells it from the other policies of its dataset."""
         return f"{self.actions}-{self.budget}" + (f"-{self.minutes:g}" if self.minutes else "")
 
     @property

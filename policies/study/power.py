@@ -1,4 +1,4 @@
-"""What the declared contrasts of a study can detect: known before anything is recorded."""
+"""The power of a study's declared contrasts: known before anything is recorded."""
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def plan(design: StudyDesign) -> str:
     """Return in words what is declared and what it can detect."""
     asked = declared(design)
     if not asked:
-        return "Nothing is declared: whatever comes out is exploratory."
+        return "Nothing is declared: all results are exploratory."
     told = f"Declared: {', '.join(each.label for each in asked)}, over {', '.join(design.tasks)} together."
     if design.draws < 2:
         return f"{told} One draw tests nothing."

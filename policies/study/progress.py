@@ -19,7 +19,7 @@ from handrail.policies.study.settings import evaluations, fingerprint
 
 @dataclass(frozen=True)
 class StudyProgress:
-    """What of a study is done; what is missing, or was made with other settings, is left out."""
+    """The finished jobs of a study; missing ones, and those made with other settings, are left out."""
 
     design: StudyDesign
     layout: StudyLayout

@@ -1,4 +1,4 @@
-"""What a study writes: a page for people, JSON for programs, and its part of a Markdown page."""
+"""The report of a study: a page for people, JSON for programs, and its part of a Markdown page."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -147,7 +147,7 @@ def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
     """Return the headline: a sentence for each declared contrast, then of equivalence."""
     asked, tested = declared(design), {each.label: each for each in found if each.family == DECLARED}
     if not asked:
-        return ["No contrast was declared before the run: what is shown explores, and nothing is tested."]
+        return ["No contrast was declared before the run: all results explore, and nothing is tested."]
     if not tested:
         return ["No draw has all that is declared on all tasks yet: nothing can be said."]
     if design.rounds:

@@ -1,4 +1,4 @@
-"""What the rollouts of a study are, policy by policy, read from the small files that its jobs leave."""
+"""The rollouts of a study, policy by policy, read from the small files that its jobs leave."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -90,7 +90,7 @@ class StudyCondition(Condition):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What the report's JSON has."""
+        """The entry in the report's JSON."""
         return {
             "task": self.task,
             "label": self.label,
@@ -123,7 +123,7 @@ class Results:
 
     @property
     def kinds(self) -> list[str]:
-        """What was collected: the modes; of rounds with what all begin, then round by round."""
+        """The datasets: the modes; of rounds the common beginning, then round by round."""
         return list(dict.fromkeys(job.cell.kind for job in self.progress.jobs))
 
     def collected(self, task: str, kind: str) -> list[dict[str, Any]]:

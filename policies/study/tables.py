@@ -184,7 +184,7 @@ def times_table(results: Results) -> Table:
         for kind, each in took.items()
     ]
     headings = ("task", "job", "jobs", "a job, by the clock", "all, of a core", "cores of the machine")
-    return Table(headings, rows, "What it took (of a job that was interrupted: since it went on)")
+    return Table(headings, rows, "Cost (of a job that was interrupted: since it went on)")
 
 
 def cells_table(results: Results, name: str) -> Table:

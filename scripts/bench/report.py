@@ -1,4 +1,4 @@
-"""What all benches share: the flags that say where results go, the JSON, the tables, the part of a page."""
+"""Shared by all benches: the flags that say where results go, the JSON, the tables, the part of a page."""
 
 import json
 import os

@@ -97,7 +97,7 @@ def test_the_robot_drives_on_where_its_own_path_is_safe_and_a_full_stop_is_not(h
 
 @pytest.mark.parametrize("height", [-0.05, 0.0])
 @pytest.mark.parametrize("trouble", ["solver", "stale"])
-def test_what_was_stored_is_followed_where_a_full_stop_is_not_safe(monkeypatch, trouble, height):
+def test_the_stored_plan_is_followed_where_a_full_stop_is_not_safe(monkeypatch, trouble, height):
     """The trouble comes at the worst moment of the same way."""
     robot, stops = Robot(MPC, (table(height),)), []
     for _ in range(60):

@@ -23,7 +23,7 @@ def scene(rng):
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_what_is_held_meets_what_moves_whichever_is_told_first(order):
+def test_held_and_moving_objects_meet_in_either_order(order):
     """Law: what is known of now says of a moment to come at most the distance then."""
     q = MODEL.description.home
     ball = Obstacle(
@@ -65,7 +65,7 @@ def test_gradients_are_the_derivatives_of_the_distances():
     assert checked > 500
 
 
-def test_what_is_skipped_is_far():
+def test_skipped_pairs_are_far():
     """Values that are not measured are lower bounds, and never of a pair within reach."""
     rng = np.random.default_rng(4)
     collision = CollisionModel(MODEL, scene(rng))
@@ -86,7 +86,7 @@ def test_what_is_skipped_is_far():
         np.testing.assert_allclose(cheap[near], exact[near], atol=1e-5)
 
 
-def test_what_was_far_of_an_obstacle_is_forgotten_when_it_has_moved():
+def test_far_pairs_of_an_obstacle_are_forgotten_when_it_has_moved():
     far, near = (Obstacle("ball", Shape("sphere", [0.1]), [x, 0.0, 0.14]) for x in (9.0, -0.8))
     collision, path = CollisionModel(MODEL, (far,)), np.tile(MODEL.description.home, (3, 1))
     assert not np.any(collision.distances(path, within=0.3).values[:, -1] < 0.3)

@@ -168,7 +168,7 @@ def test_a_rival_says_how_it_fares(name):
 @pytest.mark.parametrize(
     ("groups", "status"), [(("ee", "base"), Status.INVALID_INTENT), ((), Status.OK)], ids=["others", "none"]
 )
-def test_who_completes_twists_refuses_other_channels_and_rests_without_any(name, groups, status):
+def test_controllers_of_twists_refuse_other_channels_and_rest_without_any(name, groups, status):
     command = controller(name).update(State(HOME, REST), intent(np.full(CHANNELS.size, 0.1), *groups))
     assert command.diagnostics.status is status
     np.testing.assert_array_equal(command.velocities, 0.0)

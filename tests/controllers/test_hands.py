@@ -79,7 +79,7 @@ def test_each_joint_moves_the_hands_that_it_carries():
 
 
 @pytest.mark.parametrize("groups", [("left",), ("right",), ("left", "right"), ("pair",), ("pair", "apart")])
-def test_what_is_commanded_is_done(mpc, groups):
+def test_commanded_channels_are_followed(mpc, groups):
     wanted = AHEAD * 2 if len(groups) == 2 and groups[1] == "right" else AHEAD
     wanted = [*wanted, 0.02] if "apart" in groups else wanted
     driven = Driven(mpc)

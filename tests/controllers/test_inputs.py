@@ -49,7 +49,7 @@ def test_a_period_that_is_none_is_refused(build, period):
         lambda: Shape("sphere", np.array([1e200])),
     ],
 )
-def test_what_is_no_part_of_an_input_is_one_line(make):
+def test_an_invalid_part_of_an_input_is_one_line(make):
     with pytest.raises(HandrailError, match=r"^[^\n]+expected [^\n]+, got [^\n]+$"):
         make()
 
@@ -104,7 +104,7 @@ def test_a_dead_link_brakes_whatever_the_operators_clock_says(driven, ahead):
     assert_braked(robot, lambda k: (last,), Status.INVALID_INTENT if ahead > 1.0 else Status.STALE_INTENT, 7)
 
 
-def test_what_was_seen_before_is_not_new(driven):
+def test_an_observation_seen_before_is_not_new(driven):
     """A message that is repeated, or an older one that arrives late, makes nothing fresh."""
     robot, ask = driven
     robot.update(ask(robot.time))
@@ -149,7 +149,7 @@ def test_a_clock_that_leaps_makes_an_intent_old(driven):
     assert_braked(robot, trouble, Status.STALE_INTENT)
 
 
-def test_who_is_not_listened_to_does_not_open_the_hand(driven):
+def test_a_refused_intent_does_not_open_the_hand(driven):
     robot, ask = driven
     robot.update(replace(ask(robot.time), grippers=(1.0,)))
     for stamp in (robot.time + 10.0, robot.time - 10.0):
@@ -248,7 +248,7 @@ def test_a_mask_is_bool(mask):
 @pytest.mark.parametrize(
     "value", [1j, 10**400, 10**5000, "0.5", None, object()], ids=lambda v: type(v).__name__
 )
-def test_what_is_no_real_number_is_refused_in_one_line(value):
+def test_a_number_that_is_not_real_is_one_line(value):
     for make in (
         lambda: Intent([value] * 18, np.zeros(18, bool)),
         lambda: Intent(np.zeros(18), np.zeros(18, bool), grippers=(value,)),

@@ -26,7 +26,7 @@ def test_velocity_and_acceleration_stay_inside(previous, target, duration):
 
 
 @given(INSIDE, st.integers(0, 8), st.sampled_from([np.nan, np.inf, -np.inf]))
-def test_what_is_not_a_number_brakes_everything(previous, index, value):
+def test_nan_brakes_everything(previous, index, value):
     target = previous.copy()
     target[index] = value
     velocity, clipped = LIMITER.limit(previous, target, 0.05)

@@ -59,7 +59,7 @@ def test_an_update_depends_on_the_loop_state_alone():
 
 
 @pytest.mark.parametrize("build", [DirectController, CbfFilter])
-def test_what_a_controller_asked_for_before_does_not_matter(build):
+def test_a_controller_s_earlier_intents_do_not_matter(build):
     """It looks at one moment: an old one and a new one answer a state alike."""
     ask = asking(np.full(18, 0.3), "joint")
     robot = Robot(build(MODEL))

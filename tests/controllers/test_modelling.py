@@ -173,7 +173,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_is_one_line(case, file):
+def test_faults_are_one_line(case, file):
     pattern, other, told = WRONG[case]
     text, count = re.subn(pattern, other, file.read_text(), count=1, flags=re.MULTILINE)
     assert count == 1

@@ -42,7 +42,7 @@ def test_accelerations_are_hard_limits_for_any_intent(values, mask, share):
     arrays(float, 18, elements=st.floats(allow_nan=True, allow_infinity=True)),
     arrays(bool, 18),
 )
-def test_what_is_masked_out_never_changes_the_plan(values, garbage, mask):
+def test_masked_channels_never_change_the_plan(values, garbage, mask):
     plans = []
     for other in (np.zeros(18), garbage):
         MPC.reset()
@@ -124,7 +124,7 @@ def test_the_quadratic_is_that_of_the_cost():
     np.testing.assert_allclose(found, band, rtol=1e-4, atol=1e-2)
 
 
-def test_what_tests_call_a_solution_can_be_none():
+def test_the_tests_check_of_a_solution_can_fail():
     MPC.reset()
     problem = MPC.build_problem(STILL, asking(np.full(18, 0.2), "ee")(0.0))
     MPC.update(STILL, asking(np.full(18, 0.2), "ee")(0.0))

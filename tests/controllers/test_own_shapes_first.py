@@ -16,7 +16,7 @@ OWN = len(MODEL.description.self_pairs)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.5])
-def test_what_comes_too_near_buys_no_slack_to_the_robot_itself(speed):
+def test_a_near_obstacle_buys_no_slack_to_the_robot_itself(speed):
     """The wrist is turned towards the robot as far as it may; a ball is in the chassis, at rest or moving."""
     mpc = MaskedMpc(MODEL)
     turning = np.arange(mpc.channels.size) == mpc.channels.joint_slice.start + 7

@@ -58,7 +58,7 @@ def test_another_text_is_one_line(tmp_path, data):
     ],
     ids=["bytes", "empty", "deep", "digits", "twice", "large", "hexadecimal"],
 )
-def test_what_is_no_description_is_one_line(content, tmp_path):
+def test_a_file_that_is_no_description_is_one_line(content, tmp_path):
     path = tmp_path / "robot.toml"
     path.write_bytes(content)
     with pytest.raises(HandrailError, match="robot description"):

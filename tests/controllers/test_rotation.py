@@ -63,6 +63,6 @@ def test_a_matrix_that_is_nearly_one_is_the_nearest_rotation(size):
 
 @pytest.mark.parametrize("ask", [quaternion_from_matrix, rotation_vector])
 @pytest.mark.parametrize("wrong", [np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3))])
-def test_what_is_no_rotation_is_refused(ask, wrong):
+def test_a_matrix_that_is_no_rotation_is_refused(ask, wrong):
     with pytest.raises(ValueError, match="determinant"):
         ask(wrong)

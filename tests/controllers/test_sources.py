@@ -116,7 +116,7 @@ def test_a_source_without_weight_changes_nothing_even_if_it_is_stale():
     assert np.array_equal(found.velocities, MaskedMpc(MODEL).update(REST, ask).velocities)
 
 
-def test_what_a_source_does_not_own_means_nothing():
+def test_values_on_channels_not_owned_mean_nothing():
     """An infinite value under the mask, a source of another size that owns nothing."""
     one, other = intent(np.full(SIZE, 0.2), "ee"), intent(np.full(SIZE, 0.1), "ee", "base")
     wild = replace(one, values=np.where(one.mask, one.values, np.inf))

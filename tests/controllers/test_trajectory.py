@@ -28,7 +28,7 @@ def test_after_all_time_it_is_at_rest():
 
 
 @given(KNOTS, PERIODS, st.floats(0, 1))
-def test_what_is_left_is_the_same_curve(velocities, periods, ahead):
+def test_the_rest_of_a_plan_is_the_same_curve(velocities, periods, ahead):
     whole = left = stopping(velocities)
     for period in periods:
         left = left.after(period)

@@ -132,12 +132,12 @@ def test_tables_in_tables_come_back():
         ({"name": "a\nb"}, ("f: name:",)),
     ],
 )
-def test_what_does_not_fit_is_one_line_that_says_where(change, parts):
+def test_a_misfit_is_one_line_that_names_the_place(change, parts):
     refused(lambda: decoded(GOOD | change, Table, "f"), *parts)
 
 
 @pytest.mark.parametrize("content", [None, 1, "x", [GOOD]])
-def test_what_is_no_table_is_refused(content):
+def test_data_that_are_no_table_are_refused(content):
     refused(lambda: decoded(content, Table, "f"), "f: expected a table of name, inner")
 
 

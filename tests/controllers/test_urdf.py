@@ -83,7 +83,7 @@ WRONG = {  # what is changed in the URDF, and what the line says
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_with_a_urdf_is_one_line(case, tmp_path, capfd):
+def test_faults_of_a_urdf_are_one_line(case, tmp_path, capfd):
     pattern, other, told = WRONG[case]
     text, count = re.subn(pattern, other, URDF, count=0 if '"l3"' in pattern else 1, flags=re.DOTALL)
     assert count

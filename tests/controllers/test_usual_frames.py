@@ -82,7 +82,7 @@ def test_the_matrix_is_that_of_the_objective(robot):
         (Frames(point=np.array([0.1, 0.0, 0.0])), [".wx", ".wy", ".wz"]),
     ],
 )
-def test_what_only_its_own_frame_can_say_has_no_answer(robot, frames, lacks):
+def test_a_twist_with_missing_axes_of_its_own_frame_has_no_usual_one(robot, frames, lacks):
     model = ROBOTS[robot][0]
     channels = channels_of(model)
     hand = channels.hands[-1][0].split(".")[0]
@@ -128,5 +128,5 @@ def test_controllers_of_any_mask_do_the_same_in_any_frame(robot, build):
         Intent(np.zeros(channels_of(ONE).size), np.ones(channels_of(ONE).size, bool), frames=Frames("moon")),
     ],
 )
-def test_what_no_controller_accepts_stays(asked):
+def test_an_intent_that_no_controller_accepts_stays(asked):
     assert in_usual_frames(asked, ONE, ONE.description.home) is asked

@@ -86,7 +86,7 @@ def test_more_than_there_is_cannot_be_cut(video, tmp_path):
             cut(video, first, count, tmp_path / "cut.mp4")
 
 
-def test_what_is_no_video_is_said_in_one_line(tmp_path):
+def test_a_file_that_is_no_video_is_one_line(tmp_path):
     (tmp_path / "text.mp4").write_text("no video")
     with pytest.raises(HandrailError, match="expected a whole mp4"):
         cut(tmp_path / "text.mp4", 0, 1, tmp_path / "cut.mp4")

@@ -94,7 +94,7 @@ def test_corrections_are_counted_when_they_switch():
 
 
 @pytest.mark.parametrize("command", [np.zeros((0, 3)), np.zeros((1, 3)), np.full((9, 3), np.nan)])
-def test_what_is_no_command_has_no_chattering(command):
+def test_columns_that_are_no_command_have_no_chattering(command):
     assert np.isnan(rate_of_change(command, 50.0))
     assert np.isnan(high_frequency_content(command, 50.0))
 

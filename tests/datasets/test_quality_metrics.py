@@ -208,7 +208,7 @@ def test_effort():
     assert steered(effort.input_reversals, inputs, scale) == 0.0
 
 
-def test_what_is_not_owned_is_no_input_where_the_mask_has_the_grippers_too():
+def test_axes_not_owned_are_no_input_where_the_mask_has_the_grippers_too():
     inputs, owned = np.ones((20, 2)), np.tile([True, False, True], (20, 1))
     assert value(effort.active_axes, {"input_scale": np.ones(2)}, asked=inputs, owned=owned) == 1.0
 
@@ -220,7 +220,7 @@ def test_reversals_pass_over_the_dead_band():
     assert steered(effort.input_idle, axis, np.ones(1)) == pytest.approx(3 / 8)
 
 
-def test_what_a_device_tells_is_of_people_alone():
+def test_readings_of_devices_are_recorded_of_people_alone():
     keys = np.array(["", "keyboard", "keyboard"])
     age, back = np.array([0.0, 0.01, 0.03]), np.array([0, 1, 2])
     assert value(effort.undos, device=keys, undos=back) == 2.0
@@ -246,7 +246,7 @@ def test_take_overs():
     assert value(takeover.interventions, intervention=~taken) == 3.0
 
 
-def test_what_was_taken_over():
+def test_take_overs_are_measured():
     """Of the base, a hand, the pair, two joints, a gripper; in the last frame a demonstration."""
     names = ("base.vx", "left.vx", "pair.vx", "joint.a", "joint.b", "right.gripper")
     rows = [
@@ -291,6 +291,6 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("call", "words"), REFUSED)
-def test_what_does_not_apply_says_why(call, words):
+def test_inapplicable_metrics_give_the_reason(call, words):
     with pytest.raises(DoesNotApply, match=words):
         call()

@@ -22,7 +22,7 @@ def root():
     return canned(handrail_dataset, 3, "ee", 20)
 
 
-def test_what_is_measured_from_the_disk_is_what_is_measured_in_memory(root):
+def test_metrics_from_the_disk_are_those_from_memory(root):
     """In every view, also where an episode is in several, which is measured once for all."""
     on_disk, here = recorded_episodes(root), read_demonstrations(root)
     views = [{"a": slice(0, 12), "b": slice(6, 20)}, {"a": slice(0, 5), "b": slice(6, 9)}]

@@ -107,7 +107,7 @@ def test_a_policy_alone_imports_nothing(missing, trained, unseen):
     assert unseen()
 
 
-def test_what_was_trained_on_it_is_evaluated(trained, tmp_path):
+def test_a_policy_trained_on_its_data_is_evaluated(trained, tmp_path):
     flags = [*said("--task", "--mode", "--robot"), "--episodes", 1, "--time_limit", 0.5, "--workers", 1]
     ran(trained, *flags, "--json", tmp_path / "e.json", name="evaluate")
     content = json.loads((tmp_path / "e.json").read_text())
@@ -148,7 +148,7 @@ def test_a_metric_of_an_installed_package_is_in_the_report(recorded, tmp_path):
         (["--robot", "press_kit:PRESS"], "robot press_kit:PRESS: expected a RobotSpec, got a TaskSpec"),
     ],
 )
-def test_what_is_not_there_is_one_line(flags, words, tmp_path):
+def test_a_missing_name_is_one_line(flags, words, tmp_path):
     refused(tmp_path / "set", *flags, told=words)
     assert not (tmp_path / "set").exists()
 

@@ -182,7 +182,7 @@ def test_a_table_keeps_units_and_words_whole():
 @pytest.mark.parametrize(
     "words", [["cockpit"], ["record", "x", "--operator=gamepad"], ["user-study", "run", "x", "P"]]
 )
-def test_who_waits_is_told_so_before_anything_heavy_is_loaded(words):
+def test_waiting_is_said_before_anything_heavy_is_loaded(words):
     code = (
         "import sys\n"
         "heavy = ('mujoco', 'casadi', 'pinocchio', 'scipy', 'numba', 'lerobot')\n"

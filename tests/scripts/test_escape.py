@@ -166,7 +166,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_what_a_command_prints_of_a_stranger_s_dataset_is_text(name, sets, tmp_path):
+def test_a_stranger_s_dataset_is_printed_as_text(name, sets, tmp_path):
     script, *words = COMMANDS[name]
     plain, strange = sets
     places = {"plain": plain, "out": tmp_path / "out"}
@@ -266,7 +266,7 @@ def test_no_text_steers(text):
 
 
 @given(ANY, ANY, ANY)
-def test_what_a_terminal_shows_has_only_its_own_line_breaks(text, heading, below):
+def test_a_terminal_shows_only_its_own_line_breaks(text, heading, below):
     stream = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sys.stdout", stream)

@@ -93,7 +93,7 @@ def test_a_command_hears_before_it_imports_anything_heavy():
     assert not loaded & {"numpy", "tyro", "rich", "gymnasium", "torch", "mujoco", "multiprocessing"}
 
 
-def test_what_imports_a_command_keeps_its_own_signals():
+def test_a_program_that_imports_a_command_keeps_its_signals():
     own = (signal.default_int_handler, signal.SIG_IGN)  # a shell's background job ignores it
     assert signal.getsignal(signal.SIGINT) in own
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

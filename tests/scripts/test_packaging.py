@@ -71,11 +71,11 @@ def test_constraints_are_versions_without_addresses():
 
 
 @pytest.mark.parametrize("requirement", [Requirement(text) for text in REQUIREMENTS], ids=str)
-def test_what_is_asked_for_is_pinned_and_fits(requirement):
+def test_requested_packages_are_pinned_and_fit(requirement):
     assert requirement.specifier.contains(PINS[canonicalize_name(requirement.name)])
 
 
-def test_what_the_pins_need_is_pinned():
+def test_requirements_of_pinned_packages_are_pinned():
     """What an installed one needs, markers considered; some pins are for another platform."""
     installed = {
         canonicalize_name(each.metadata["Name"]): each.requires or () for each in metadata.distributions()

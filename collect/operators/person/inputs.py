@@ -1,4 +1,4 @@
-"""What a person's device says: where its inputs are now, and what they ask for."""
+"""The inputs of a person's device: where they are now, and what they ask for."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -57,7 +57,7 @@ STILLS = frozenset(("pause", "success", "failure", "discard", "restart", "quit",
 
 @dataclass(frozen=True)
 class Ask:
-    """What is asked for once: one of `ASKS`, and how much of it."""
+    """A request that counts once: one of `ASKS`, and how much of it."""
 
     what: str
     value: Any = True

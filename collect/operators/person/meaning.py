@@ -1,4 +1,4 @@
-"""What the operator's inputs mean: deflections and joint targets become an intent on the mode's channels."""
+"""From the operator's inputs, deflections and joint targets, to an intent on the mode's channels."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -22,7 +22,7 @@ HAND_FRAMES: tuple[HandFrame, ...] = ("world", "base", "tool", "view")
 
 @dataclass(frozen=True)
 class Setting:
-    """What the operator has chosen."""
+    """The operator's choices."""
 
     mode: TeleopMode  # teleop mode
     focus: Focus = "hand"  # what they attend to, in a mode that makes a difference

@@ -173,7 +173,7 @@ class Person:
 
     @property
     def between(self) -> EpisodeEvent | None:
-        """What holds before an episode begins: QUIT, PAUSE in the e-stop, or None."""
+        """The request that holds before an episode begins: QUIT, PAUSE in the e-stop, or None."""
         if self._quits or self._event is EpisodeEvent.QUIT:
             return EpisodeEvent.QUIT
         return EpisodeEvent.PAUSE if self.phase is Phase.STOPPED else None

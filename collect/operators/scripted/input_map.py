@@ -82,7 +82,7 @@ class LargeTurn:
 
 
 class InputMap(ABC):
-    """What lies between a goal and an intent: what the operator has in hand.
+    """The map from a goal to an intent: the operator's input device.
 
     Args:
         model: of the robot.

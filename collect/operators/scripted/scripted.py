@@ -25,7 +25,7 @@ _POSITION_ORDER = 0.25 / 0.35  # refractory time of a position device over a vel
 
 @dataclass(frozen=True)
 class ScriptedDevice:
-    """What an operator has in hand; the numbers are a scripted person's, tuned on the same seeds for each."""
+    """An operator's input device; the numbers are a scripted person's, tuned on the same seeds for each."""
 
     name: str  # as a mode names it
     help: str  # one line
@@ -56,7 +56,7 @@ DEVICES = Registry(
 
 
 class Script(Protocol):
-    """What to do for a task, moment by moment."""
+    """The steps of a task, moment by moment."""
 
     def reset(self, view: View) -> None:
         """Look at the scene and make up the mind."""

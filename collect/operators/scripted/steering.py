@@ -1,4 +1,4 @@
-"""What an operator wants, whatever the teleop mode, and how far they push the stick towards it."""
+"""An operator's goal in any teleop mode, and how far they push the stick towards it."""
 
 import math
 from collections.abc import Sequence
@@ -52,14 +52,14 @@ class Target:
 
     @property
     def identity(self) -> bytes:
-        """What stays the same while the operator only sees better how far the hand has to go."""
+        """Bytes that stay the same while the operator only sees better how far the hand has to go."""
         numbers = [self.base, (self.meant or self.hand).rotation.ravel(), [self.distance, self.pace]]
         return np.concatenate(numbers).tobytes()
 
 
 @dataclass(frozen=True)
 class MotionGoal:
-    """What an operator wants the robot to do now, whatever the mode."""
+    """The motion that an operator wants now, in any mode."""
 
     hand: FloatArray  # twist of the tool, world-aligned, (6,) [m/s, rad/s]
     base: FloatArray  # twist of the base in the base frame, (3,)

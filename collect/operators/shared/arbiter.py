@@ -16,7 +16,7 @@ _MOVED = 1e-3  # of a commanded velocity: less is a hand that rests on its stick
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a person and a policy want in this moment."""
+    """The intents of a person and of a policy in this moment."""
 
     time: float  # of the robot's clock [s]
     person: Intent  # in the usual frames
@@ -80,8 +80,8 @@ class Groups:
         """Return the channels that others lose to an owner of some, (m,): those and what contradicts them.
 
         The base's twist and its joints are the same motion. With a hand go the pair, and the joints of its
-        arm alone; with all of these joints goes the hand. What moves a hand from afar (base, torso) stays:
-        the MPC lets the arm make up for it.
+        arm alone; with all of these joints goes the hand. Joints that move a hand from afar (base, torso)
+        stay: the MPC lets the arm make up for it.
         """
         lost, pair = owned.copy(), self.masks["pair"]
         base = self.masks["base"] | self.channels.mask(*self.channels.joints[: len(self.channels.base)])

@@ -6,7 +6,7 @@ from handrail.collect.operators.shared.arbiter import Lately, Shares, Wishes
 
 
 class ByMask(Lately):
-    """What a person moves is theirs, the policy keeps the rest; let go, it is handed back after a moment."""
+    """A person has the channels that they move, the policy the rest; let go, they go back after a moment."""
 
     def shares(self, wishes: Wishes) -> Shares:
         """Return 1 where a source is the owner, 0 elsewhere."""

@@ -24,7 +24,9 @@ ARBITERS = Registry(
     ArbiterSpec,
     (
         ArbiterSpec(
-            "by_mask", f"{_HERE}.by_input:ByMask", "the person has what they move, the policy keeps the rest"
+            "by_mask",
+            f"{_HERE}.by_input:ByMask",
+            "the person has the channels that they move, the policy the rest",
         ),
         ArbiterSpec("whole", f"{_HERE}.by_input:Whole", "any input of the person takes the whole robot"),
         ArbiterSpec("blend", f"{_HERE}.by_input:Blend", "where both ask, both are in the MPC's objective"),

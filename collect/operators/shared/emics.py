@@ -70,7 +70,7 @@ class Criterion(Protocol):
 
 
 class Performance:
-    """Whoever drives loses the robot if it makes too little of the way that the policy would make.
+    """A driver loses the robot by making too little of the way that the policy would make.
 
     With the policy's wish û on its channels and what these do, c, the error of goal-directed motion is
     `e = ‖û‖ - û·c / max(‖û‖, ε)`, from 0 to 2 ‖û‖, and `E = ⟨e⟩ / max(⟨‖û‖⟩, ε)`: 0 as fast as the policy

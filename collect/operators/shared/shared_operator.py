@@ -5,7 +5,7 @@ person ─ intent ─┐
                  ├▶ arbiter ─ weights ─▶ intents of two sources ─▶ controller
 policy ─ intent ─┘
 ```
-Whatever the person says of the episode (pause, e-stop, success) comes first: the policy moves only while they
+A person's word on the episode (pause, e-stop, success) comes first: the policy moves only while they
 supervise, with an input that is fresh.
 """
 

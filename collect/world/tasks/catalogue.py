@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TaskSpec:
-    """A task: one entry makes it. What is `module:name` is imported when it is built."""
+    """A task: one entry makes it. A `module:name` is imported when it is built."""
 
     name: str  # as on the command line
     task: Callable[..., Any] | str  # its class, a `Task`
     script: Callable[..., Any] | str  # what a scripted person does, `(model, gains, drives) -> Script`
     help: str  # one line
     objectives: Callable[..., Any] | str | None = None
-    """What the masked MPC looks after by itself, `(channels, hand) -> (Objective, …)`; None: nothing."""
+    """Objectives that the masked MPC adds by itself, `(channels, hand) -> (Objective, …)`; None: nothing."""
     released_channels: tuple[str, ...] = ()  # channels of the tool that the operator leaves to them
     owned_channels: tuple[str, ...] = ()
     """Channels that an operator who drives the base by itself keeps nevertheless."""

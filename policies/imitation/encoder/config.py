@@ -59,7 +59,7 @@ class EncoderConfig:
 
     @property
     def session(self) -> SessionConfig:
-        """What its scenes and pictures are drawn by."""
+        """The session that draws its scenes and pictures."""
         seen = {"cameras": self.cameras, "image_size": self.image_size}
         return SessionConfig(task=self.task, robot=self.robot, **seen)
 

@@ -41,7 +41,7 @@ _FARTHEST = 0.5  # standard deviation by which the robot is moved at most [m · 
 _RANDOMISED = 4  # every so-many-th chunk
 Samples = dict[str, np.ndarray]
 START, DRIVEN, OTHER = range(3)
-"""What kind of moment a sample is, in `kind`: START and DRIVEN are as a policy sees them."""
+"""The kind of moment of a sample, in `kind`: START and DRIVEN are as a policy sees them."""
 
 
 @dataclass
@@ -81,7 +81,7 @@ class Drawn:
 
     @cached_property
     def reads(self) -> Reads:
-        """What an encoder of these reads and says."""
+        """The inputs and outputs of an encoder of these."""
         env, _ = self._plain
         features = session_features(env)
         interface = PolicyInterface.of_dataset(features, (), "realised")

@@ -1,4 +1,4 @@
-"""What is evaluated: a checkpoint, whose robot and task it, its dataset or flags say, under a condition."""
+"""The evaluated arms: a checkpoint, its robot and task (from it, its dataset or flags), and a condition."""
 
 import hashlib
 import itertools
@@ -201,7 +201,7 @@ class PolicyCondition:
 
     checkpoint: Checkpoint
     protection: str
-    """What stands between it and the robot: `none`, `mpc`, `filter`, or a mode's `cbf`."""
+    """The controller between it and the robot: `none`, `mpc`, `filter`, or a mode's `cbf`."""
     perturbation: Perturbation
     time_limit: float
     """Time after which a rollout is given up [s]; the task's own when 0."""
@@ -209,7 +209,7 @@ class PolicyCondition:
 
     @property
     def conditions(self) -> dict[str, str]:
-        """What all rollouts of this label have in common."""
+        """The values that all rollouts of this label share."""
         return {
             **{name: str(getattr(self.checkpoint.meta, name)) for name in _SAID},
             **({"hand": hand} if (hand := self.checkpoint.meta.hand) else {}),

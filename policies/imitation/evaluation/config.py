@@ -34,10 +34,10 @@ class EvaluateConfig(ExecutionConfig):
     seed: Advanced[Annotated[int, Meta(ge=0, le=10**9)]] = 0
     """Of the evaluation: which beginnings and disturbances; never those of a recording."""
     protection: Names = "own"
-    """What stands between policy and robot, one or more: own (an intent's own controller; none for joint
+    """The controller between policy and robot, one or more: own (an intent's own controller; none for joint
     velocities), none, mpc, filter."""
     perturbation: Names = "none"
-    """What disturbs, one or more: none, push, shift, delay, camera, blank, swap, with a size such as push:2
+    """Disturbances, one or more: none, push, shift, delay, camera, blank, swap, with a size such as push:2
     or delay:5, joined by + to have several at once."""
     label: Advanced[str] = ""
     """Name of the condition; the teleop mode, and what is special about it, when empty."""

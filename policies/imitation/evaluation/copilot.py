@@ -85,7 +85,7 @@ def _check_fits(checkpoint: Checkpoint, config: RecordConfig, env: HandrailEnv) 
 
 
 class _Driver(PolicyOperator):
-    """What it draws depends on the episode's seed alone; PyTorch computes with one thread."""
+    """Its random draws depend on the episode's seed alone; PyTorch computes with one thread."""
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""

@@ -38,7 +38,7 @@ class PolicyOperator:
     """Lets a policy steer; an operator.
 
     An action of another size, or one that is not finite, becomes an intent that no controller accepts: the
-    robot brakes. What was planned for moments at which nobody asked is left out; while the robot's clock
+    robot brakes. Actions planned for moments at which nobody asked are left out; while the robot's clock
     stands still, as where nobody hears it, the policy does, too.
 
     Args:

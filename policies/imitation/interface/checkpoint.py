@@ -53,10 +53,10 @@ class TrainingSizes:
 
 @dataclass(frozen=True)
 class PolicyMeta:
-    """What a policy is and how it came about."""
+    """The description of a policy and of its training."""
 
     interface: PolicyInterface | None
-    """What it reads and writes; None if that is what was recorded."""
+    """Its inputs and outputs; None if they are the recorded columns."""
     environment: Name
     """The task of its episodes; "" if they do not say."""
     mode: Name

@@ -43,7 +43,7 @@ FORMAT = "handrail.encoder/2"
 
 @dataclass(frozen=True)
 class Reads:
-    """What an encoder reads, and what it says; saved with it."""
+    """The inputs and outputs of an encoder; saved with it."""
 
     robot: Name
     task: Name
@@ -73,7 +73,7 @@ class Reads:
 
 @dataclass(frozen=True)
 class Said:
-    """What a camera says of one object at T moments, in the world's axes."""
+    """A camera's estimates of one object at T moments, in the world's axes."""
 
     tool: FloatArray
     """Where the tool is, (T, 3) [m]."""
@@ -135,7 +135,7 @@ class Encoder:
 
     @cached_property
     def digest(self) -> str:
-        """What tells it apart from others."""
+        """A digest that tells it apart from others."""
         return hashlib.sha256(self._bytes).hexdigest()[:16]
 
     def look(

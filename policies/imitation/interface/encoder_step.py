@@ -42,7 +42,7 @@ class PolicyEncoderStep(OwnStep):
     """Reads from pictures where things are, as `observation.environment_state`, whatever is told of it."""
 
     reads: dict[str, Any]
-    """What the encoder reads and says, as JSON."""
+    """The encoder's inputs and outputs, as JSON."""
 
     def __post_init__(self) -> None:
         """Make the encoder; its weights come later."""

@@ -1,7 +1,7 @@
-"""What a policy reads and writes, and how both come from and go to what Handrail records.
+"""The inputs and outputs of a policy, and how they come from and go to Handrail's columns.
 
 It writes the joint velocities that came about, or the operator's own command: both are values on channels, in
-the base's axes like what the policy sees. Whatever comes out, the robot's limits bound it.
+the base's axes like the policy's view. The robot's limits bound all of its output.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

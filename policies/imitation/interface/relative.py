@@ -1,4 +1,4 @@
-"""What a policy sees: the recorded numbers, seen from the robot instead of from the world.
+"""The view of a policy: the recorded numbers, seen from the robot instead of from the world.
 
 With `R_wb` the base's heading and `(p_t, R_t)` the tool's pose, the pose `(p_o, R_o)` of an object becomes
 

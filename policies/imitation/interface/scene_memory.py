@@ -1,11 +1,12 @@
-"""What was said before is remembered, in the world's axes: a Kalman filter of a thing that stands or moves.
+"""A memory of estimates, in the world's axes: a Kalman filter of a thing that stands or moves.
 
     P ← P + q 1                        a frame later; q is small for what stands, or is out of reach
     K = P (P + Σ)⁻¹                    Σ: how far what a camera says now is off
     x ← x + K (y − x),  P ← (1 − K) P
 
-So a place is found from its rays, by several cameras and by one that moves. What is far from what is known
-counts only when it is said again and again: P grows meanwhile, until it fits. NaN and infinity never count.
+So a place is found from its rays, by several cameras and by one that moves. An estimate far from the known
+place counts only when it comes again and again: P grows meanwhile, until it fits. NaN and infinity never
+count.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +26,7 @@ _ALIKE = 4.0  # frames that say as much as one of what stands: what is off now i
 
 
 class SceneMemory:
-    """What is known of the objects of one episode.
+    """The known objects of one episode.
 
     Args:
         reads: of the encoder.
@@ -46,7 +47,7 @@ class SceneMemory:
 
 
 class _Known:
-    """What is known of an object, from all that was said.
+    """The state of an object, from all estimates.
 
     Args:
         turns: it looks the same after so many-th of a turn around its z axis.

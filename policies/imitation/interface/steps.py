@@ -51,7 +51,7 @@ _views: "WeakValueDictionary[PolicyInterface, PolicyViewStep]" = WeakValueDictio
 
 @dataclass(frozen=True)
 class Completion:
-    """What completes the intents of a policy into the whole robot's motion: its mode's own controller."""
+    """The completion of a policy's intents into the whole robot's motion: its mode's own controller."""
 
     robot: Name
     task: Name

@@ -33,7 +33,7 @@ class TrainedPolicy:
     """A policy that can drive."""
 
     meta: PolicyMeta | None
-    """What it is; None of a policy of plain LeRobot."""
+    """Its description; None for a policy of plain LeRobot."""
     policy: Any
     """LeRobot's."""
     before: Callable[[dict[str, Any]], dict[str, Any]]
@@ -105,7 +105,7 @@ class TrainedPolicy:
 def load_policy(folder: str | Path) -> TrainedPolicy:
     """Load a policy from a `pretrained_model` folder, a checkpoint, or a training's folder (the last one).
 
-    It computes on the CPU. Whoever made it, loading it runs no code of theirs (`trust.py`).
+    It computes on the CPU. Loading it never runs code of its maker's (`trust.py`).
     """
     place = model_folder(Path(folder).expanduser())
     meta = read_meta(place) if (place / NAME).is_file() else None

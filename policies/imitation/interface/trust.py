@@ -1,4 +1,4 @@
-"""What a checkpoint may hold before LeRobot loads it: whoever made it, loading it runs no code of theirs.
+"""The check of a checkpoint's content before LeRobot loads it: loading it never runs code of its maker's.
 
 LeRobot imports and calls whatever `class` a processor's JSON names, reads what its paths lead to, and some of
 its policies fetch networks and tokenizers, with code, from where their settings say. So here

@@ -1,4 +1,4 @@
-"""What an encoder says of an episode: as its pictures show it, or as it would be said without an error."""
+"""An encoder's estimates in an episode: from its pictures, or as they would be without an error."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice

@@ -65,7 +65,7 @@ class TrainingSource:
     info: DatasetInfo
     selection: Selection
     interface: PolicyInterface | None
-    """What the policy reads and writes; None where that is what was recorded."""
+    """The policy's inputs and outputs; None where they are the recorded columns."""
     features: Features
     """Every column that it learns from, and every camera."""
     encoder: Encoder | None
@@ -75,7 +75,7 @@ class TrainingSource:
 
     @cached_property
     def digest(self) -> str:
-        """What tells the data apart: of the numbers in all columns, then of the pictures, if it sees any."""
+        """Digest of the data: of the numbers in all columns, then of the pictures, if it sees any."""
         digest = hashlib.sha256()
         for key, values in sorted(self.columns.items()):
             digest.update(f"{key} {values.dtype} {values.shape}".encode())

@@ -1,4 +1,4 @@
-"""What happened in a case's run, and what it amounts to in numbers."""
+"""The trace of a case's run, and its numbers."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ from handrail.scripts.bench.report import spread
 
 @dataclass(frozen=True)
 class CaseTrace:
-    """What happened, after each of the T control periods."""
+    """The trace, after each of the T control periods."""
 
     case: PaperCase
     times: FloatArray  # [s], (T,)

@@ -1,4 +1,4 @@
-"""Who takes part in the benchmark: each controller, what its operator sends, and how often it is asked."""
+"""The benchmark's controllers: each one, its operator's messages, and how often it is asked."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -25,7 +25,7 @@ _JOINTS, _SMOOTHED = f"{_HERE}:joint_intent", f"{_HERE}:smoothed_hand_intent"
 
 @dataclass(frozen=True)
 class Baseline:
-    """A controller in the benchmark: one entry makes it. What is `module:name` is imported when it is built.
+    """A controller in the benchmark: one entry makes it. A `module:name` is imported when it is built.
 
     Functions are a module's own, so that worker processes find them.
     """
@@ -34,7 +34,7 @@ class Baseline:
     help: str  # one line
     build: Callable[..., Any] | str  # `(model, period [s]) -> Controller`
     operator: Callable[..., Any] | str = f"{_HERE}:hand_intent"
-    """What the planner's twist becomes, `(model) -> (twist, state, time) -> Intent`; anew an episode."""
+    """The operator: `(model) -> (twist, state, time) -> Intent`, anew an episode."""
     period: float | None = None  # between two updates [s]; None: the planner's
     aims: bool = False  # whether the controller needs to know the goal; then it has `aim(goal)`
     lag: tuple[float, float] = (0.0, 0.0)

@@ -31,7 +31,7 @@ _SETTLING = 134  # steps after the planner's last one, without early stop (4 s)
 
 @dataclass(frozen=True)
 class Conditions:
-    """What an episode is run under; the same for every controller."""
+    """The conditions of an episode; the same for every controller."""
 
     goal: Pose  # to reach
     scene: Scene  # obstacles

@@ -34,7 +34,7 @@ COST = {
     "update_ms_median": ("update ms", 2),
     "updates_per_s": ("updates a second", 1),
 }
-"""What a controller costs: of an episode, of an update (median of the episode's), updates a second of it."""
+"""The cost of a controller: of an episode, of an update (median of the episode's), updates a second of it."""
 SAFETY = {
     "contacts": ("steps in contact", 1),
     "smallest_distance": ("smallest distance m", 3),
@@ -52,7 +52,7 @@ AIM = 0.01  # position error within which a planner that sees the hand was to br
 
 @dataclass(frozen=True)
 class Trace:
-    """What happened in an episode of T steps."""
+    """The trace of an episode of T steps."""
 
     q: FloatArray  # positions before the first and after every step, (T + 1, n)
     v: FloatArray  # the simulated joint velocities after every step, (T, n)

@@ -25,7 +25,7 @@ _KEYS = np.array([0.15] * 3 + [0.5] * 3)  # `quantised`: what a key commands [m/
 
 @dataclass(frozen=True)
 class Commands:
-    """What an operator sends in each of the T steps of an episode, and what of it arrives."""
+    """An operator's messages in each of the T steps of an episode, and the delivered ones."""
 
     twists: FloatArray  # sent, world-aligned at the tool [m/s, rad/s], (T, 6)
     progress: FloatArray  # how far along its line the planner is, in its own steps, (T,)

@@ -120,7 +120,7 @@ class _Round:
         try:
             now = self._work.saved()
         except Exception as error:
-            self._complaints.append(f"{when} what was saved cannot be read: {error}")
+            self._complaints.append(f"{when} saved data cannot be read: {error}")
             return {}
         self._complaints += [f"{when} {each}" for each in self._work.lost(before, now)]
         return now

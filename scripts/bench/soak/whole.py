@@ -1,4 +1,4 @@
-"""What is saved on a disk, episode by episode, each with a digest of all its rows and pictures."""
+"""The saved content of a disk, episode by episode, each with a digest of all its rows and pictures."""
 
 import hashlib
 import json

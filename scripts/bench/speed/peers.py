@@ -24,7 +24,7 @@ from handrail.controllers.solvers.real_time import NOTHING_ACTIVE, RealTimeSolve
 from handrail.scripts.bench.speed.timing_loop import PERIOD, Times, TimingLoop, Update
 
 Solve = Callable[[], FloatArray | None]
-"""What is timed; returns the solution, or None."""
+"""The timed call; returns the solution, or None."""
 Take = Callable[[Update], Solve]
 """Takes the problem of an update; what this does is not timed."""
 

@@ -50,7 +50,7 @@ class SpeedConfig(ReportConfig):
     updates: Annotated[int, Meta(ge=10)] = 400
     """Timed updates of every case."""
     peers: Names = "all"
-    """What is timed beside it, or all that is installed: ipopt, mink, pink, own_qp, daqp, piqp, two_sources;
+    """Peers timed beside it, or all that are installed: ipopt, mink, pink, own_qp, daqp, piqp, two_sources;
     empty for nothing."""
     solves: AtLeastOne = 40
     """Updates of a case whose problem the peers solve too."""

@@ -61,7 +61,7 @@ class Times:
 
 @dataclass(frozen=True)
 class SpeedCase:
-    """What one loop measures."""
+    """The measurements of one loop."""
 
     degrees: int = 9  # of freedom
     pairs: int = 0  # to keep apart, about

@@ -40,7 +40,7 @@ def drive(env, poses, numbers):
     return seen
 
 
-def test_what_is_played_is_what_was_every_tenth_of_a_second(env):
+def test_playback_shows_every_tenth_of_a_second(env):
     model = env.simulation.mujoco_model
     poses = EpisodePoses(model)
     seen = drive(env, poses, range(9))
@@ -51,7 +51,7 @@ def test_what_is_played_is_what_was_every_tenth_of_a_second(env):
     np.testing.assert_array_equal(rows, [seen[number] for number in range(0, 9, 2)])
 
 
-def test_what_was_undone_is_not_played(env):
+def test_undone_frames_are_not_played(env):
     model, poses = env.simulation.mujoco_model, EpisodePoses(env.simulation.mujoco_model)
     drive(env, poses, range(4))
     mark = env.checkpoint()
@@ -86,7 +86,7 @@ def test_old_ones_make_room():
     assert list(files) == large[-2:]
 
 
-def test_what_is_thrown_away_is_told_and_not_kept():
+def test_a_discarded_episode_is_told_and_not_kept():
     files = {}
     listed = EpisodeList(SimpleNamespace(keep=files.__setitem__, drop=files.__delitem__))
     listed.add(outcome(EpisodeEvent.DISCARD), None)

@@ -58,7 +58,7 @@ def test_a_session_cannot_be_made_to_last_longer(guard):
     assert not guard.admits(HERE, {COOKIE: f"{int(end) + 9}.{rest}"}, "10.0.0.1")
 
 
-def test_who_guesses_waits_and_keeps_nobody_out(guard, clock):
+def test_guessing_tokens_waits_and_keeps_nobody_out(guard, clock):
     assert not any(guard.log_in(f"wrong {n}", "10.0.0.1") for n in range(5))
     assert guard.guesses("10.0.0.1")
     assert not guard.guesses("10.0.0.2")

@@ -7,7 +7,7 @@ from command_helpers import refused
 
 
 @pytest.mark.parametrize("missing", ["uvicorn", "starlette"])
-def test_what_is_missing_is_named(tmp_path, monkeypatch, missing):
+def test_a_missing_package_is_named(tmp_path, monkeypatch, missing):
     found = importlib.util.find_spec
     with monkeypatch.context() as patch:
         patch.setattr(importlib.util, "find_spec", lambda name: None if name == missing else found(name))

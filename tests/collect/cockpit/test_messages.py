@@ -76,6 +76,6 @@ def test_anything_else_is_refused(text):
 
 
 @given(st.one_of(st.text(max_size=200), st.binary(max_size=200)))
-def test_whatever_comes_gives_an_error_of_ours(text):
+def test_any_message_gives_an_error_of_ours(text):
     with contextlib.suppress(HandrailError):
         parse(text)

@@ -130,7 +130,7 @@ EVENTS = {
 
 
 @pytest.mark.parametrize("event", EVENTS)
-def test_whatever_the_page_does(chromium, recording, witness, event):
+def test_faults_of_the_page(chromium, recording, witness, event):
     with driven(chromium, recording, witness) as made:
         happened = time.time()
         EVENTS[event](made.page)

@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 pytestmark = pytest.mark.slow
 
 
-def test_what_is_not_wanted_is_not_saved(new_page, tmp_path):
+def test_discarded_episodes_are_not_saved(new_page, tmp_path):
     """Thrown away: another scene. Again: the same one. Practice: as if it had not been."""
     with driven(new_page, tmp_path / "d", "--task", "reach") as driver:
         first = driver.place("goal")

@@ -209,7 +209,7 @@ def test_only_who_may_say_done_is_asked_whether_it_is(on_bench, refuses, asked, 
         ({"isDriver": False, "isConnected": False}, "no connection", "No connection. Trying again …"),
     ],
 )
-def test_who_watches_is_told_what_is_so(on_bench, now, chip, banner):
+def test_watchers_are_told_the_state(on_bench, now, chip, banner):
     _, driver = on_bench()
     script = "async (now) => (await import('./states.js')).stateOf(now)"
     state = driver.page.evaluate(script, now | {"frame": {"phase": "driving", "practice": True}})

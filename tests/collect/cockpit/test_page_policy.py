@@ -131,7 +131,7 @@ def test_the_person_ends_the_episode_while_the_policy_drives(driven, witness):
     witness.until(lambda frame: frame["saved"] == before + 2)
 
 
-def test_what_is_moved_is_the_persons_and_the_page_says_so(driven, witness):
+def test_moved_channels_are_the_persons_and_the_page_says_so(driven, witness):
     driver, _ = driven
     hand = driver.at("owned").get_by_role("button", name="you own the hand")
     expect(driver.at("drivers")).to_contain_text("The policy drives the hand. Hold a key to take the hand.")

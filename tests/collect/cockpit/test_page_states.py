@@ -79,7 +79,7 @@ def test_a_countdown_starts_the_episode_and_any_action_ends_it(on_bench):
     driver.expect_phase("ready: press Start")
 
 
-def test_whatever_the_browser_remembers_the_page_works(on_bench):
+def test_the_page_works_with_any_memory_of_the_browser(on_bench):
     """Text that is no JSON, another kind of value, an older page's keys, keys without a stop."""
     made, driver = on_bench()
     names = ["handrail:hint", "handrail:countdown", "handrail:sticks", f"handrail:map:{made.robot}"]

@@ -80,16 +80,14 @@ def test_reach_by_keys(new_page, tmp_path):
         (page_tasks.reach, Keys, "keyboard", "direct", 1, 1),
     ],
 )
-def test_who_tries_what_each_lever_does_does_the_task(
-    new_page, tmp_path, task, levers, device, mode, episodes, fewest
-):
+def test_trying_each_lever_does_the_task(new_page, tmp_path, task, levers, device, mode, episodes, fewest):
     """Nobody is told what a joint's key does to the hand; they find out, within a longer time."""
     drive(new_page, tmp_path / "d", task, levers, episodes, mode)
     check(tmp_path / "d", episodes, device, mode, fewest)
 
 
 @pytest.mark.parametrize(("levers", "device"), [(PairKeys, "keyboard"), (PairPad, "gamepad")])
-def test_who_knows_where_the_box_is_carries_it_with_both_hands(new_page, tmp_path, levers, device):
+def test_a_page_that_knows_the_box_carries_it_with_both_hands(new_page, tmp_path, levers, device):
     """`HANDRAIL_CARRIED=5` for five times; how many of them went well is printed."""
     episodes, person = int(os.environ.get("HANDRAIL_CARRIED", "1")), (PairDriver, PairLearner)
     drive(new_page, tmp_path / "d", carry_box, levers, episodes, "pair", person, "--robot", "tiago_pro")

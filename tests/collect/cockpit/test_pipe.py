@@ -30,7 +30,7 @@ def test_a_long_message_arrives_whole(ends):
     assert found == [(Kind.PICTURE, data)]
 
 
-def test_what_is_said_once_waits_for_room(ends):
+def test_messages_said_once_wait_for_room(ends):
     ours, theirs = ends
     fill(ours)
     ours.send_surely(Kind.ASK, b"first")
@@ -66,7 +66,7 @@ def test_a_stop_takes_the_place_of_what_waits(ends):
     assert theirs.receive() == [(Kind.STOP, None), (Kind.LOST, None)]
 
 
-def test_what_takes_motion_away_is_never_dropped(ends):
+def test_messages_that_take_motion_away_are_never_dropped(ends):
     ours, theirs = ends
     fill(ours)
     for number in range(500):
@@ -107,7 +107,7 @@ def test_the_newest_scene_replaces_one_that_waits(ends):
     assert found == [b"99" * 50_000]
 
 
-def test_what_is_too_large_is_dropped_and_ends_nothing(ends):
+def test_too_large_messages_are_dropped_and_end_nothing(ends):
     ours, theirs = ends
     assert not ours.send(Kind.PICTURE, b"x" * (LARGEST + 1))
     assert ours.send(Kind.DRIVE, b"x")

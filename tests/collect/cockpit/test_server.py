@@ -93,7 +93,7 @@ def test_a_round_trip_is_the_first_answer_to_a_frame(served):
         assert second > first
 
 
-def test_what_was_sent_before_is_refused(served):
+def test_a_message_sent_before_is_refused(served):
     with page(served, "page-number-one") as socket:
         told(socket, "stage")
         socket.send(drive(5))

@@ -79,7 +79,7 @@ def frame(env):
 
 
 @pytest.mark.parametrize("status", list(Status))
-def test_whatever_brakes_says_why(env, status):
+def test_every_brake_has_a_reason(env, status):
     words = reason(status, (), env.model.description.home, env.model.description)
     assert words == STATUS[status]
     assert words.startswith("braking: ") == status.brakes

@@ -131,7 +131,7 @@ def test_stop_wins_over_what_a_stalled_server_finds(hub, ends):
     assert robot.person.phase is Phase.STOPPED
 
 
-def test_what_is_queued_over_a_stall_does_not_steer(hub, ends):
+def test_messages_queued_over_a_stall_do_not_steer(hub, ends):
     """Without a STOP, too: it answers pictures of before."""
     now = time.monotonic()
     serve(hub, QueuedSocket([*stalled(ends[0], 3.0), drive(1000, now), drive(1001, now, [0.5] * 18)]))
@@ -168,7 +168,7 @@ def test_letting_go_is_never_too_much(hub, ends):
     assert not any(inputs[-1]["axes"])
 
 
-def test_who_answers_an_old_picture_still_lets_go(hub, ends):
+def test_a_page_that_answers_an_old_picture_still_lets_go(hub, ends):
     stale = stalled(ends[0])
     serve(hub, QueuedSocket([*stale, drive(1000, time.monotonic() - 4.0)]))
     (inputs,) = [data[0] for kind, data in ends[0].receive() if kind == Kind.DRIVE]

@@ -100,7 +100,7 @@ def test_a_session_adds_in_the_same_words_and_without_episodes_leaves_nothing(tm
     assert sorted(root.rglob("*")) == before
 
 
-def test_what_lies_beside_a_dataset_without_episodes_stays(tmp_path):
+def test_files_beside_a_dataset_without_episodes_stay(tmp_path):
     config = replace(PLAIN, dataset=FoundDatasetConfig(place="mine"))
     (tmp_path / "mine").mkdir()
     with session_writer(located(config, ENV), ENV) as writer:

@@ -82,7 +82,7 @@ def assert_same_pictures(some, others):
         assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
-def test_what_is_drawn_afterwards_is_what_is_recorded_at_once(tmp_path, taken):
+def test_pictures_drawn_afterwards_are_those_recorded_at_once(tmp_path, taken):
     record(tmp_path / "at_once", *LOOK)
     at_once = taken.copy()
     taken.clear()
@@ -130,7 +130,7 @@ def test_an_episode_that_is_not_exact_is_named_and_the_same_command_finishes(tmp
         patch.setattr(OpenDataset, "frames", of_another_version)
         said = fails(blind, output)
     assert f"episode 4 of {blind}: expected an exact replay, got one that deviates by " in said
-    assert "what was drawn is kept in " in said
+    assert "drawn pictures are kept in " in said
     assert not output.exists()
     assert replayed == [0, 1, 2, 3, 4]
     replayed.clear()
@@ -140,7 +140,7 @@ def test_an_episode_that_is_not_exact_is_named_and_the_same_command_finishes(tmp
     assert [path.name for path in tmp_path.iterdir()] == ["seen"]
 
 
-def test_what_was_drawn_of_something_else_is_drawn_anew(tmp_path, monkeypatch):
+def test_pictures_of_something_else_are_drawn_anew(tmp_path, monkeypatch):
     """Its seeds are the same: it was recorded with another mode."""
     other, output = tmp_path / "other", tmp_path / "seen"
 
@@ -186,7 +186,7 @@ def test_episodes_that_were_added_get_theirs(tmp_path, replayed):
     assert all(np.array_equal(first, second) for first, second in pairs)
 
 
-def test_what_was_trimmed_at_its_beginning_has_to_be_drawn_before(tmp_path):
+def test_an_episode_trimmed_at_its_beginning_has_to_be_drawn_before(tmp_path):
     """The robot crept then, which the commands that are left do not tell."""
     blind, trimmed = tmp_path / "blind", tmp_path / "trimmed"
     record(blind, "--time_limit", "4", episodes=1)

@@ -43,7 +43,7 @@ def test_nothing_is_wrong_with_a_robot_that_comes_along(robot):
     assert ran(robot, name="robot check") == f"{robot}: nothing is wrong\n"
 
 
-def test_what_is_wrong_ends_with_1(tmp_path):
+def test_faults_end_with_1(tmp_path):
     path = tmp_path / "robot.toml"
     path.write_text(
         ROBOTS["lekiwi"]
@@ -82,7 +82,7 @@ REFUSED = {
 
 @pytest.mark.usefixtures("_here")
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_made_is_one_line_and_writes_nothing(case):
+def test_impossible_settings_are_one_line_and_write_nothing(case):
     words, told = REFUSED[case]
     refused("new", *words, name="robot", told=told)
     assert not list(Path().iterdir())

@@ -124,7 +124,7 @@ def test_an_interrupt_ends_all_workers_and_one_core_goes_on(number, alone, tmp_p
     process.send_signal(number)
     _, said = process.communicate(timeout=120)
     assert process.returncode == 130
-    assert "interrupted; what was recorded is kept in" in said
+    assert "interrupted; the recording is kept in" in said
     assert said.count("error:") == 1, said  # the workers say nothing
     assert "Traceback" not in said
     assert workers
@@ -164,7 +164,7 @@ def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
     shutil.rmtree(shards)
 
 
-def test_what_is_left_of_shards_that_were_being_removed_is_no_part_of_the_next_recording(alone, tmp_path):
+def test_half_removed_shards_are_no_part_of_the_next_recording(alone, tmp_path):
     root, shards = tmp_path / "d", tmp_path / ".d.shards"
     record(tmp_path / "other", "--seed", "4", episodes=5)
     shards.mkdir()
@@ -203,12 +203,12 @@ def test_all_cores_record_where_that_pays_and_is_safe(episodes, settings, expect
         (["--ray", "auto"], "--ray auto and --workers 2: expected one of them"),
     ],
 )
-def test_what_cannot_be_shared_is_one_line(flags, words, tmp_path):
+def test_a_recording_that_workers_cannot_share_is_one_line(flags, words, tmp_path):
     refused(tmp_path / "d", *FLAGS, "--workers", "2", *flags, told=words)
     assert not os.listdir(tmp_path)
 
 
-def test_what_was_set_aside_is_still_there_when_shards_have_become_a_part(tmp_path):
+def test_episodes_set_aside_are_still_there_when_shards_have_become_a_part(tmp_path):
     root = tmp_path / "d"
     record(root, episodes=2)
     Layout(root).row(1).write_bytes(b"torn")

@@ -67,7 +67,7 @@ GUIDED = (
 )
 
 
-def test_what_was_turned_drives_what_was_asked_for_the_right_way(capsys):
+def test_turned_joints_drive_the_requested_ones_the_right_way(capsys):
     found = run(Hands(*GUIDED))
     assert {name: (joint.source, round(joint.scale, 6)) for name, joint in found.joints.items()} == {
         UR10[0]: ("pan.pos", round(math.pi / 180, 6)),
@@ -88,7 +88,7 @@ def test_another_unit_is_measured_by_the_quarter_turn():
 
 
 @pytest.mark.parametrize("turned", [{}, {"pan.pos": 9.0}, {"pan.pos": 80.0, "flex.pos": 60.0}])
-def test_what_is_not_clear_is_asked_again(turned, capsys):
+def test_an_unclear_answer_is_asked_again(turned, capsys):
     hands = Hands(("", turned), *GUIDED)
     assert run(hands).joints[UR10[0]].source == "pan.pos"
     assert sum(words.startswith(UR10[0]) for words in hands.asked) == 2

@@ -52,7 +52,7 @@ def test_targets_are_never_far_ahead_nor_beyond_the_limits(leader, arm, places):
         assert np.all(np.abs(targets) <= LIMIT)
 
 
-def test_what_was_too_much_is_forgotten():
+def test_excess_of_the_leader_is_forgotten():
     """An arm that stands still follows at once when the leader turns back."""
     made, arm = clutch(), np.zeros(3)
     made.targets(True, np.zeros(3), arm)

@@ -84,7 +84,7 @@ def test_one_that_is_gone_is_none_until_it_is_there_again(device, poller, error)
     assert poller.trouble == ""
 
 
-def test_what_was_pressed_before_it_was_gone_is_forgotten(device, poller):
+def test_keys_pressed_before_a_device_was_gone_are_forgotten(device, poller):
     device.readings = [DeviceInput(0.0, presses=("success",))]
     poller.start()
     eventually(lambda: not device.readings)

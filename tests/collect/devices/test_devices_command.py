@@ -34,14 +34,14 @@ def _plugged_in(monkeypatch):
     monkeypatch.setattr(devices, "SpaceMouse", lambda *_: Lever("spacemouse", "plug one in"))
 
 
-def test_what_is_there_is_ready_and_what_is_not_says_what_to_do():
+def test_present_devices_are_ready_and_others_get_advice():
     shown = " ".join(ran(name="devices list").split())
     assert "gamepad ready spacemouse plug one in keyboard " in shown
     assert "leader_arm serial ports: " in shown
     assert "so101_leader" in shown
 
 
-def test_what_a_device_says_is_shown_line_by_line():
+def test_readings_of_a_device_are_shown_line_by_line():
     lines = ran("gamepad", "--seconds", 0.3, name="devices test").splitlines()
     assert len(lines) == 3
     assert lines[-1] == "x +0.50"

@@ -184,7 +184,7 @@ def test_garbage_is_some_keys_or_none_and_never_an_error(pieces):
     assert all(key.name in NAMES or key.name in SIGNALS for key in all_keys(pieces))
 
 
-def test_what_is_pasted_is_not_typed():
+def test_pasted_text_is_not_typed():
     taken = KeyBytes()
     assert taken.take(b"wwwwwwwwwwwwwwwww", 0.0) == []
     assert taken.take(b"w", 1.0) == [Key("w")]
@@ -230,7 +230,7 @@ def test_a_stop_on_another_key_is_not_kept_back_either(terminal, clock):
         ([(0.0, "y"), (0.3, "y"), (0.6, "y"), (1.4, "y")], ["y", "y"]),
     ],
 )
-def test_what_a_plain_terminal_repeats_is_the_key_that_came_last(keys, terminal, clock, typed, wanted):
+def test_a_plain_terminal_repeats_the_last_key(keys, terminal, clock, typed, wanted):
     start, seen = clock.now, []
     for time, character in typed:
         clock.now = start + time

@@ -61,7 +61,7 @@ def test_each_gripper_has_a_control_of_its_own(device):
         assert driven.act().grippers == grippers
 
 
-def test_what_moves_something_asks_for_nothing_but_the_stop():
+def test_a_control_that_moves_something_asks_for_nothing_but_the_stop():
     driven = Driven("gamepad", model=MODEL)
     driven.begin()
     own(driven, "base", "left")

@@ -164,7 +164,7 @@ def test_a_recording_with_a_leader_arm_and_a_gamepad(tmp_path, pad, listens, mon
         (("--operator", "spacemouse", *BESIDE), 'spacemouse beside --policy: expected a control to "hold"'),
     ],
 )
-def test_what_cannot_be_is_one_line_and_nothing_is_written(tmp_path, monkeypatch, flags, said):
+def test_impossible_settings_are_one_line_and_nothing_is_written(tmp_path, monkeypatch, flags, said):
     hid = PlayedHid()
     hid.plugged = False
     monkeypatch.setitem(sys.modules, HID, hid)
@@ -187,7 +187,7 @@ def test_a_spacemouse_with_a_button_to_hold_may_be_beside_a_policy(tmp_path, mon
 
 @pytest.mark.parametrize("name", MULTIPLEXERS)
 @pytest.mark.parametrize("operator", ["keyboard", "leader_arm"])
-def test_what_answers_for_a_terminal_that_hangs_is_refused_beside_a_policy(
+def test_a_device_that_answers_for_a_hanging_terminal_is_refused_beside_a_policy(
     tmp_path, monkeypatch, name, operator
 ):
     monkeypatch.setenv(name, "/tmp/socket,1,0")

@@ -108,7 +108,7 @@ def test_an_older_one_of_another_vendor_is_known_and_its_mice_are_not(played):
         SpaceMouse().open()
 
 
-def test_what_has_come_is_read_without_waiting_for_more(played, mouse):
+def test_received_bytes_are_read_without_waiting_for_more(played, mouse):
     """hidapi takes a patience of 0 for none given: unless told otherwise, it waits for the next report."""
     played.reports = [FORWARD]
     assert mouse.read().deflections == {"x": 1.0}

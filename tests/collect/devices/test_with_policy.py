@@ -56,7 +56,7 @@ class Watched:
 @pytest.mark.parametrize(
     ("flags", "mine", "held"), [(GAMEPAD, "person", "left_shoulder"), (LEADER, "person", "")]
 )
-def test_who_moves_a_device_takes_over_and_gives_back(tmp_path, pad, monkeypatch, flags, mine, held):
+def test_moving_a_device_takes_over_and_gives_back(tmp_path, pad, monkeypatch, flags, mine, held):
     for place in ("lerobot.utils.constants", "lerobot.teleoperators.teleoperator"):
         monkeypatch.setattr(f"{place}.HF_LEROBOT_CALIBRATION", tmp_path / "calibration")
     save_calibration(CALIBRATION, calibration_file(LeaderConfig(type="played_leader"), "ridgeback_ur10"))

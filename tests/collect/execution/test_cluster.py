@@ -55,7 +55,7 @@ def test_an_interrupt_ends_all_at_once_and_one_core_goes_on(cluster, alone, tmp_
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=120)
     assert process.returncode == 130, said
-    assert "interrupted; what was recorded is kept in" in said
+    assert "interrupted; the recording is kept in" in said
     assert "Traceback" not in said
     kept = {path: path.read_bytes() for path in saved(shards)}
     assert EPISODES // 4 <= len(kept) < EPISODES

@@ -76,15 +76,15 @@ def test_a_failure_says_why_and_stops_only_what_needs_it(config):
         "refused": "the disk is full",
         "ours": "RuntimeError: a mistake of ours",
         "left": "SystemExit: enough",
-        "after": "what it needs failed",
-        "long after": "what it needs failed",
+        "after": "a job that it needs failed",
+        "long after": "a job that it needs failed",
         "other": "",
     }
     assert found["other"].value == 9
 
 
 @everywhere
-def test_what_is_no_longer_wanted_does_not_begin(config, tmp_path):
+def test_jobs_no_longer_wanted_do_not_begin(config, tmp_path):
     jobs = [Job(str(number), noted, (tmp_path, str(number))) for number in range(6)]
     found = run(jobs, config, wanted=lambda job: int(job.name) % 2 == 0)
     assert set(found) == {"0", "2", "4"}
@@ -138,7 +138,7 @@ def test_a_fresh_process_for_each_job_also_where_there_is_one_worker(config):
 
 
 @elsewhere
-def test_what_a_job_says_is_in_its_log(config, tmp_path):
+def test_the_output_of_a_job_is_in_its_log(config, tmp_path):
     log, said = tmp_path / "logs" / "refused.log", io.StringIO()
     run([Job("refused", refusing, ("no",), log=log), Job("ours", broken, log=log)], config, said=said)
     assert "about to fail" in log.read_text()

@@ -129,7 +129,7 @@ def until(link: Link, so) -> None:
 
 
 @pytest.mark.parametrize("junk", JUNK, ids=lambda junk: json.dumps(junk)[-40:])
-def test_what_lerobot_s_client_makes_of_junk_moves_nothing_and_is_no_sign_of_life(junk, wire):
+def test_junk_through_lerobot_s_client_moves_nothing_and_is_no_sign_of_life(junk, wire):
     says, link = wire
     before, heard = link.body.targets, link.state.q
     says.send_json(junk)
@@ -183,7 +183,7 @@ def test_a_pause_at_rest_is_in_real_time_and_the_robot_is_heard():
     assert outcome.success
 
 
-def test_what_waited_in_the_network_while_the_loop_halted_is_read_first():
+def test_messages_that_waited_while_the_loop_halted_are_read_first():
     client = PlayedClient()
     link, queue, answer = played(client), [], client.get_observation
     client.get_observation = lambda: queue.pop(0) if queue else answer()

@@ -115,7 +115,7 @@ def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
         one.pictures(("wrist",), (64, 64))
 
 
-def test_what_is_red_before_a_lekiwis_camera_is_red_in_the_dataset():
+def test_red_before_a_lekiwis_camera_is_red_in_the_dataset():
     """Its camera says RGB; its host codes that, and LeRobot's client decodes it, as if it were BGR."""
     import cv2
     from lerobot.cameras import ColorMode

@@ -42,7 +42,7 @@ def observed(monkeypatch):
     return seen
 
 
-def test_what_lerobot_records_it_replays_to_the_same_motion(run, observed, tmp_path):
+def test_lerobot_replays_its_recording_to_the_same_motion(run, observed, tmp_path):
     root = tmp_path / "set"
     script = (f"--teleop.calibration_dir={tmp_path}", "--teleop.type=handrail_scripted")
     times = ("--teleop.episode_time_s=3", "--teleop.reset_time_s=1")

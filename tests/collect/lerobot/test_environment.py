@@ -27,7 +27,7 @@ def made(**settings):
 
 
 @pytest.mark.parametrize("task", fitting(TASKS, 1))
-def test_what_a_policy_reads_is_what_its_features_say(task):
+def test_a_policy_reads_its_declared_features(task):
     config, env = made(task=task)
     features = env_to_policy_features(config)
     observation, _ = env.reset(seed=[3])
@@ -79,7 +79,7 @@ def test_an_action_of_another_size_is_said():
 
 
 @pytest.mark.parametrize("mode", ["ee", "switching"])
-def test_what_lerobot_records_of_our_robot_is_what_a_policy_reads_and_writes(mode):
+def test_lerobot_records_the_columns_that_a_policy_reads_and_writes(mode):
     config, env = made(task="pick_place", mode=mode, scene_in_state=True)
     robot = HandrailSim(HandrailSimConfig(task="pick_place", mode=mode, diagnostics=False))
     features = env_to_policy_features(config)

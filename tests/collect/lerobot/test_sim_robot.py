@@ -117,7 +117,7 @@ def test_no_number_of_an_action_may_be_none(mode, focus):
         assert not action.intent(wrong, 0.0).is_finite
 
 
-def test_what_is_no_command_brakes_and_is_counted(tmp_path):
+def test_a_malformed_command_brakes_and_is_counted(tmp_path):
     with steered(tmp_path) as (robot, teleop):
         actions = loop(robot, teleop, 20)
         for name, value in (("ee.x.vel", np.nan), ("ee.x.vel", np.inf), ("gripper.pos", np.nan)):

@@ -47,7 +47,7 @@ def test_one_axis_at_a_time(view):
     assert not used & {f"joint.{name}" for name in MODEL.description.base.joints}
 
 
-def test_who_errs_looks_for_the_axis_and_guesses_which_way_a_new_joint_goes(view):
+def test_an_erring_operator_looks_for_the_axis_and_guesses_its_sign(view):
     """Every change of the axis takes 0.15 log₂ 10 s; half of the first pushes go the wrong way."""
     first, pauses = [], []
     for seed in range(12):

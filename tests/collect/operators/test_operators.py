@@ -61,7 +61,7 @@ def test_persons_differ_and_a_perfect_one_does_not():
     assert (moods.persons, moods.moods) == (first.persons, first.moods)
 
 
-def test_what_is_near_is_judged_well():
+def test_near_distances_are_judged_well():
     """Weber's law: the misjudgement is in proportion to the distance, and rests where nothing is wanted."""
     errors = {}
     for length in (0.05, 0.5):
@@ -74,7 +74,7 @@ def test_what_is_near_is_judged_well():
     np.testing.assert_allclose(errors[0.5], 10.0 * errors[0.05])
 
 
-def test_who_thinks_of_joints_errs_as_who_steers_the_hand():
+def test_operators_of_joints_err_as_those_of_the_hand():
     """The pose that is seen is as far off as the way that is seen; what is meant stays what it was."""
     tool, rng = MODEL.pose(HOME), np.random.default_rng(3)
     for _ in range(5):

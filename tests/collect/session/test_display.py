@@ -93,7 +93,7 @@ def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path,
     assert saved.stat().st_size > 2**17
 
 
-def test_what_goes_wrong_in_drawing_is_said_once_and_no_more(monkeypatch):
+def test_an_error_in_drawing_is_said_once(monkeypatch):
     said = []
     display = Display(say=said.append)
     monkeypatch.setattr(Drawing, "see", lambda self, frame: 1 / 0)

@@ -62,7 +62,7 @@ def driven(task, plan, shared=False, **asked):
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_what_the_hand_holds_as_an_episode_begins_stays_in_it(shared):
+def test_an_object_held_at_the_beginning_stays_in_the_hand(shared):
     frames, outcome = driven("tray", [UP] * 20, shared, closed=True)
     assert {frame.action[-1] for frame in frames} == {1.0}
     assert outcome.failure_reason != "tray_dropped"
@@ -82,7 +82,7 @@ def test_an_undo_takes_back_what_a_gripper_did(shared, closed):
 
 
 @pytest.mark.parametrize("frame", ["world", "base", "tool"])
-def test_what_is_recorded_is_along_the_world_s_axes_in_whatever_frame_the_hand_is_steered(frame):
+def test_intents_are_recorded_along_the_world_s_axes_in_every_frame(frame):
     """As policies of intents take it."""
     config = SessionConfig(task="reach")
     env = build_env(config, 20)

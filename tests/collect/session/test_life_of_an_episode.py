@@ -110,7 +110,7 @@ def test_a_pause_brakes_holds_and_goes_on(env, controller):
 
 
 @pytest.mark.parametrize("event", [DISCARD, RESTART, QUIT])
-def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
+def test_an_episode_that_is_not_kept_is_over_at_once(env, event, tmp_path):
     with recording(tmp_path / "d", env) as recorder:
         writer, person = recorder.writer, Person(env.model, {9: event}, {5: SUCCESS})
         session = Session(env, DirectController(env.model, env.period), person, [recorder])

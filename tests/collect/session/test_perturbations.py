@@ -23,7 +23,7 @@ from handrail.controllers.robot.model import load_model
 MODEL = load_model()
 
 
-def test_what_is_written_is_what_is_read():
+def test_written_values_are_read_back():
     for text in ("none", "push:1", "push:2.5+shift:0.3+delay:4", "camera:2", "blank:1+swap:1"):
         assert Perturbation.parse(text).text == text
     assert Perturbation.parse("push+shift+delay+camera+blank+swap").sizes == DEFAULTS
@@ -114,7 +114,7 @@ def test_a_shifted_start_is_elsewhere_and_free(task):
         assert near.min() > 0.0 or after.grip
 
 
-def test_what_is_held_keeps_its_place_in_the_hand():
+def test_a_held_object_keeps_its_place_in_the_hand():
     before = Tray().sample(MODEL, np.random.default_rng(1))
     after = sample_shifted(Tray(), 0.5, MODEL, np.random.default_rng(1))
     for name in ("tray", "can"):

@@ -126,7 +126,7 @@ class Grip:
 
 
 @pytest.mark.parametrize("mode", ["ee", "direct"])
-def test_what_is_recorded_is_what_was_sent(mode):
+def test_the_recorded_command_is_the_sent_one(mode):
     """Also of a robot that is held fast: consecutive actions keep the limits; the controller knows them."""
     watcher, config = Watcher(), SessionConfig(task="reach", mode=mode)
     env = build_env(config, 20)

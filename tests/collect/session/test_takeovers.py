@@ -47,7 +47,7 @@ def test_owners_are_those_who_drove(takeovers):
         assert replay_episode(takeovers, episode)[0].largest == 0.0
 
 
-def test_what_the_policy_wanted_is_kept_also_where_the_person_drove(takeovers):
+def test_the_policy_s_intent_is_kept_also_where_the_person_drove(takeovers):
     frames, names = read_frames(takeovers, 0), read_info(takeovers).features["owner"].names
     answered = np.array([frame not in (*NONE, *PAUSED) for frame in range(FRAMES)])
     wanted, gripper = np.isin(names, "ee.vx") * 0.05 * answered[:, None], 0.25 * answered
@@ -147,7 +147,7 @@ def test_a_card_has_the_measures(tmp_path):
     assert "interventions" in (root / "README.md").read_text()
 
 
-def test_what_was_taken_over_is_printed_and_compared(takeovers, tmp_path):
+def test_take_overs_are_printed_and_compared(takeovers, tmp_path):
     assert re.search(r"^0 +3\.00 +100 +0\.267 ", ran(takeovers, "--check", name="inspect"), re.MULTILINE)
     plain = canned(record_takeovers, 1, shared=False)
     assert "taken over" not in ran(plain, name="inspect")

@@ -81,7 +81,7 @@ def test_objectives_and_completions_are_of_the_hand_that_does_it(task, mode):
     assert build_session(config, build_env(config, 20)).run(0).success
 
 
-def test_what_a_hand_holds_moves_with_it():
+def test_a_held_object_moves_with_the_hand():
     """And comes through an environment's numbers with its hand; the other hand's gripper is open."""
     env = build_env(SessionConfig(task="tray", robot=ROBOT, hand="right"), 20)
     env.reset(seed=0)

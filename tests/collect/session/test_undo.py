@@ -84,7 +84,7 @@ def recorded(root, plan, plant, robot_fps=FPS, watchers=(), **options):
 
 @pytest.mark.parametrize("plant", [Simulation, IdealRobot])
 @pytest.mark.parametrize("robot_fps", [FPS, 3 * FPS])
-def test_what_was_undone_never_was(tmp_path, plant, robot_fps):
+def test_undone_frames_are_not_recorded(tmp_path, plant, robot_fps):
     frames, outcome = recorded(tmp_path / "undone", UNDONE, plant, robot_fps)
     plain, _ = recorded(tmp_path / "plain", PLAIN, plant, robot_fps)
     assert outcome.undos == 1

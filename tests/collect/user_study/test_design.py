@@ -47,7 +47,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_is_said_in_one_line(case):
+def test_faults_are_said_in_one_line(case):
     changes, *words = WRONG[case]
     content = {name: value for name, value in (GOOD | changes).items() if value is not None}
     with pytest.raises(HandrailError) as told:

@@ -106,7 +106,7 @@ def test_practice_is_over_after_successes_in_a_row_or_enough_attempts(successes,
     assert Practice(successes=2, most=5).is_over(successes) is over
 
 
-def test_who_does_not_consent_is_told_so_and_drives_nothing(tmp_path):
+def test_without_consent_nobody_drives_and_it_is_said(tmp_path):
     folder = study_folder(tmp_path)
     ending, desk, track = session(folder, "P001", SyntheticDesk("P001", consent="no"))
     assert ending is Ending.REFUSED
@@ -128,7 +128,7 @@ def test_a_trial_that_is_paused_begins_anew_and_is_counted(tmp_path):
     assert trials(folder) == wanted(folder, "P001")
 
 
-def test_whoever_ends_for_today_goes_on_with_that_trial(tmp_path):
+def test_a_participant_who_ends_for_today_goes_on_with_that_trial(tmp_path):
     folder = study_folder(tmp_path)
     desk = SyntheticDesk("P001", pause="end")
     ending, _, before = session(folder, "P001", desk, [EpisodeEvent.QUIT])

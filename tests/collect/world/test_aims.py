@@ -17,7 +17,7 @@ def aim_of(env, state):
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.2])
-def test_what_a_person_is_told_of_the_goal_is_what_the_judge_says(scale):
+def test_a_person_is_told_the_judge_s_goal(scale):
     """Within the distance and the angle of the aim, and only there, the goal is reached."""
     rng, told = np.random.default_rng(0), []
     with environment("Reach") as env:

@@ -52,7 +52,7 @@ def test_a_held_thing_is_where_the_hand_takes_it():
                 assert collision.values(q[None])[0, row] == pytest.approx(other, abs=1e-5)
 
 
-def test_what_is_held_does_not_come_nearer_because_other_things_come():
+def test_a_held_object_comes_no_nearer_because_others_come():
     """What it keeps once it keeps on; to what came while it was held, what there was then."""
     other = replace(POST, name="other")
     first = CollisionModel(MODEL, (POST, BOX))

@@ -63,7 +63,7 @@ def test_every_number_is_what_it_is_without(task, looks):
 
 
 @pytest.mark.needs_gl
-def test_what_says_what_to_do_stays_recognisable():
+def test_colours_of_goals_stay_recognisable():
     for seed in range(8):
         (_, model), (_, usual) = (
             episodes((seed,), 0, task="reach", randomise=drawn) for drawn in (True, False)

@@ -120,7 +120,7 @@ def test_an_episode_among_movers_is_the_seeds():
         np.testing.assert_array_equal(one.state, same.state)
 
 
-def test_what_stands_around_becomes_numbers_and_back():
+def test_obstacles_become_numbers_and_back():
     env = build_env(SessionConfig(task="reach", moving_obstacles=2), 20)
     env.reset(seed=1)
     held = Obstacle("cup", Shape("cylinder", np.array([0.03, 0.1])), np.array([0, 0, 0.1]), frame="tool")

@@ -21,7 +21,7 @@ def build(request):
     return lambda *things, **options: request.param(MODEL, Scene(things), HOME, STEP, **options)
 
 
-def test_whatever_is_sent_is_inside_the_limits_and_known(build):
+def test_every_sent_command_is_inside_the_limits_and_known(build):
     rng, robot = np.random.default_rng(0), build()
     before = robot.state().commanded
     assert not before.any()
@@ -72,7 +72,7 @@ def test_running_into_something_is_a_contact(build):
     assert "post" in touched
 
 
-def test_what_moves_by_itself_is_where_its_patrol_says(build):
+def test_a_moving_obstacle_is_where_its_patrol_says(build):
     start, end = np.array([3.0, 3.0, 0.5]), np.array([3.0, 4.0, 0.5])
     mover = SceneObject("cart", Shape("box", [0.2, 0.2, 0.2]), start, patrol=Patrol(start, end, 0.5))
     robot = build(mover)
@@ -82,7 +82,7 @@ def test_what_moves_by_itself_is_where_its_patrol_says(build):
     np.testing.assert_allclose(robot.poses()["cart"].position, mover.patrol.position(0.5), atol=1e-3)
 
 
-def test_what_takes_physics_is_refused_without_them():
+def test_movable_objects_are_refused_without_physics():
     cube = SceneObject("cube", Shape("box", [0.05, 0.05, 0.05]), np.array([2.0, 2.0, 0.5]), mass=0.1)
     with pytest.raises(HandrailError, match="nothing can be moved, got cube"):
         IdealRobot(MODEL, Scene((cube,)), HOME, STEP)

@@ -60,7 +60,7 @@ def test_the_task_s_objectives_are_a_condition_of_their_own():
     assert watcher.tilt < 0.1
 
 
-def test_who_drives_with_a_tray_minds_its_height():
+def test_a_driver_with_a_tray_minds_its_height():
     """The arm begins nearer to itself than the MPC likes; left alone it would lower the hand by 0.2 m."""
     outcome, watcher = run("tray", mode="switching", noise=1.0, seed=episode_seed(900, 2))
     assert outcome.success, outcome

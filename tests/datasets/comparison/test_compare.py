@@ -123,7 +123,7 @@ def test_the_same_seed_gives_the_same_report(ours, tmp_path):
     assert one == two
 
 
-def test_what_does_not_apply_is_empty_and_never_zero(mixed_report):
+def test_inapplicable_numbers_are_empty_and_never_zero(mixed_report):
     rows = list(csv.DictReader(mixed_report[1].splitlines()))
     assert {row["contacts"] for row in rows if row["group"] == "calm"} == {""}
     assert [row["contacts"] for row in rows if row["group"] == "quick"][:3] == ["0.0", "1.0", "0.0"]
@@ -149,7 +149,7 @@ def test_nothing_is_claimed_where_nothing_differs(ours):
     assert headline(same).count("no difference detected") == 2
 
 
-def test_what_policies_did_is_in_the_report(ours, tmp_path):
+def test_evaluations_are_in_the_report(ours, tmp_path):
     given = evaluations(tmp_path / "evaluations.json", 3, quick=0.9, slow=0.5)
     _, content, _ = report(ours, tmp_path, evaluations=(given,))
     assert content["contrasts"][0]["nested"][1] < 0

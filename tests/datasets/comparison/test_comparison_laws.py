@@ -138,7 +138,7 @@ def condition_of(label, mean, policies, generator, scenes=100, luck=0.0, difficu
 
 
 @pytest.mark.parametrize(("policies", "luck"), [(3, 0.05), (3, 0.1), (5, 0.1)])
-def test_what_is_called_detectable_is_detected_four_times_in_five(few_resamples, policies, luck):
+def test_detectable_differences_are_detected_four_times_in_five(few_resamples, policies, luck):
     """A difference that experiments claim to see, in 60 others like them: seen in 60 to 95 % of these."""
     generator = rng(9, policies, int(100 * luck))
 
@@ -243,7 +243,7 @@ def test_a_measure_of_a_dataset_is_its_mean_over_the_frames(metric):
     assert measured.values[metric.name]["all"].estimate == pytest.approx(np.nanmean(of_frames))
 
 
-def test_what_differs_is_detected_however_many_tests_there_are(few_resamples):
+def test_a_difference_is_detected_among_many_tests(few_resamples):
     (length,) = [metric for metric in METRICS if metric.name == "length"]
     many = [replace(length, name=f"length_{number}") for number in range(101)]
     short = group("short", 12, rng(6))

@@ -132,7 +132,7 @@ def test_p_is_that_of_all_swaps_of_signs(six):
     assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
 
 
-def test_what_cannot_be_detected_is_said(six):
+def test_too_few_participants_are_said(six):
     assert any("Too few to detect any difference" in text for text in people_report(six[1]).cautions)
     assert not any(each.detected for each in six[1].contrasts if each.scope == "reach")
     nine = {f"P{n}": {None: [float(n)]} for n in range(9)}

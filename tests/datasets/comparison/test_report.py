@@ -137,7 +137,7 @@ def test_metrics_are_turned_so_that_right_is_better(alike):
     assert turned_round == applied & {metric.title for metric in METRICS if metric.good == "lower"}
 
 
-def test_what_has_no_better_direction_stands_apart(alike):
+def test_metrics_without_a_better_direction_stand_apart(alike):
     ratio = next(metric for metric in METRICS if metric.name == "variation_ratio")
     each = replace(contrast(ratio, 1.0, 0.5, 1.5), label=LONG[1], baseline=LONG[0])
     view = replace(alike.everything, differences=[*alike.everything.differences, each])

@@ -72,7 +72,7 @@ def test_boschloo_is_symmetric_and_sees_more_than_fisher():
     assert 0.005 < found.p < float(np.asarray(fisher_exact([[7, 1], [5, 11]]))[1])
 
 
-def test_what_is_detectable_shrinks_with_the_root_of_the_trials():
+def test_the_detectable_difference_shrinks_with_the_root_of_the_trials():
     few, many = (unpaired_shares([True, False] * n, [True, False] * n) for n in (10, 40))
     assert few.detectable() == pytest.approx(2.8016 * np.sqrt(0.5 / 20), rel=1e-3)
     assert many.detectable() == pytest.approx(0.5 * few.detectable(), rel=1e-3)
@@ -141,7 +141,7 @@ def test_training_seeds_widen_the_interval():
     assert min(between) > 0.05
 
 
-def test_what_is_paired_stays_paired():
+def test_pairs_stay_paired():
     same = runs([0.5])
     one, other = resample_runs([same, same], rng())
     assert np.array_equal(one, other)

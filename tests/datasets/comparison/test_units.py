@@ -74,7 +74,7 @@ KNOWN = {
 
 @pytest.mark.parametrize("needs", ["motion", "position", "action", "scale"])
 @pytest.mark.parametrize(("one", "other", "reason"), UNKNOWN.values(), ids=UNKNOWN)
-def test_what_is_not_known_to_be_the_same_is_not_compared(one, other, reason, needs):
+def test_columns_not_known_to_be_the_same_are_not_compared(one, other, reason, needs):
     found = apart(needs, one, other)
     if needs == "scale" and one[0].entries("state") != other[0].entries("state"):
         reason = "different columns"
@@ -84,7 +84,7 @@ def test_what_is_not_known_to_be_the_same_is_not_compared(one, other, reason, ne
 
 @pytest.mark.parametrize("needs", ["motion", "position", "action", "scale"])
 @pytest.mark.parametrize(("one", "other"), KNOWN.values(), ids=KNOWN)
-def test_what_is_known_to_be_the_same_is_compared(one, other, needs):
+def test_columns_known_to_be_the_same_are_compared(one, other, needs):
     assert apart(needs, one, other) == ""
 
 

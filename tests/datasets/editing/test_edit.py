@@ -191,7 +191,7 @@ def test_a_mistake_is_one_line_and_changes_nothing(tmp_path, line):
     assert tree(tmp_path) == before
 
 
-def test_what_another_tool_wrote_is_not_edited(tmp_path):
+def test_datasets_of_other_tools_are_not_edited(tmp_path):
     root = copied(tmp_path / "set", record_episodes)
     Layout(root).manifest.unlink()
     assert "lerobot-edit-dataset edits it" in edit("trim --in_place", root, code=2).stderr
@@ -250,7 +250,7 @@ def test_a_link_stays_and_what_it_leads_to_is_edited(recorded, tmp_path, output)
     assert all((tmp_path / name).is_symlink() for name in ("set", "new"))
 
 
-def test_what_is_dropped_behind_a_link_is_gone(tmp_path):
+def test_episodes_dropped_behind_a_link_are_gone(tmp_path):
     root = copied(tmp_path / "far", record_episodes, cameras=True)
     (tmp_path / "set").symlink_to(root)
     assert drop_episodes(tmp_path / "set", lambda row: row["seed"] > 1) == 2

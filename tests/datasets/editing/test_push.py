@@ -146,7 +146,7 @@ def test_participants_are_not_sent(tmp_path, hub):
     assert (hub.sent, hub.repo) == ({}, {})
 
 
-def test_who_drove_is_not_known_so_nothing_is_sent(tmp_path, hub):
+def test_episodes_of_unknown_drivers_are_not_sent(tmp_path, hub):
     """LeRobot's `delete_episodes` drops the column that says whose an episode is."""
     root = record_episodes(tmp_path / "set", 2, driven=True)
     said = push(root, "--upload", code=2).stderr
@@ -229,7 +229,7 @@ def test_a_copy_that_was_cut_short_is_no_dataset_and_is_made_again(sent, root, s
     assert len(there(store)) == 17
 
 
-def test_what_is_in_a_store_is_not_replaced(root, store):
+def test_data_in_a_store_are_not_replaced(root, store):
     push(root, "--to", STORE, "--upload")
     before = there(store)
     assert "found 17 files" in push(root, "--to", STORE, "--upload", code=2).stderr

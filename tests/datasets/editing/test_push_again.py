@@ -5,7 +5,7 @@ from hub_helpers import push
 from huggingface_hub import HfApi
 
 
-def test_what_is_public_on_the_hub_is_not_taken_for_private(root, hub):
+def test_a_public_dataset_on_the_hub_is_not_taken_for_private(root, hub):
     hub.private = False
     assert "me/reach is on the hub and public" in push(root, "--upload", code=2).stderr
     assert not hub.sent

@@ -49,5 +49,5 @@ def test_a_recording_says_to_pack_before_streaming_and_packed_it_streams_right(t
 
 
 @pytest.mark.parametrize(("episodes", "cameras"), [(1, True), (EPISODES, False)])
-def test_what_streams_right_is_not_to_be_packed(episodes, cameras, tmp_path):
+def test_a_dataset_that_streams_right_is_not_to_be_packed(episodes, cameras, tmp_path):
     assert packing_advice(record(tmp_path / "set", episodes, cameras=cameras)) == ""

@@ -42,7 +42,7 @@ def split(tmp_path):
 
 
 @pytest.mark.parametrize("write", [merged, split])
-def test_what_has_been_saved_under_the_name_meanwhile_is_never_replaced(tmp_path, meanwhile, write):
+def test_data_saved_under_the_name_meanwhile_are_never_replaced(tmp_path, meanwhile, write):
     for name in ("one", "two", "elsewhere"):
         record(tmp_path / name, 2)
     there = tree(tmp_path / "elsewhere")
@@ -62,7 +62,7 @@ def test_nobody_begins_a_dataset_while_another_is_written_under_its_name(tmp_pat
     assert len(read_episodes(tmp_path / "out")) == 4
 
 
-def test_whoever_takes_a_dataset_written_anew_has_it_alone(tmp_path, meanwhile):
+def test_a_rewritten_dataset_is_held_by_one_alone(tmp_path, meanwhile):
     root, taken = record(tmp_path / "set", 2), []
     meanwhile["after"] = lambda: fails(lambda: taken.append(resume(root)), "another recorder")
     merge_datasets([root], root)

@@ -107,7 +107,7 @@ def test_a_dataset_of_lerobot_copied_in_part_is_named_as_such(tmp_path):
     assert "episode 5" in done.stdout
 
 
-def test_what_lerobot_adds_is_read_and_checked(tmp_path):
+def test_lerobot_s_additions_are_read_and_checked(tmp_path):
     """A dataset that LeRobot has recorded on has lines without checksums: it is read, but not resumed."""
     root = record(tmp_path / "set", 2)
     layout = Layout(root)

@@ -145,7 +145,7 @@ def test_frames_that_do_not_fit(tmp_path, change, words):
         ({}, "task", {"seed": 2**64}),
     ],
 )
-def test_what_no_file_takes_costs_one_episode(tmp_path, change, task, said):
+def test_a_value_that_no_file_takes_costs_one_episode(tmp_path, change, task, said):
     with create(tmp_path / "set") as writer:
         record_one(writer, cameras=False)
         writer.add_frame(frame_of(1, 0, cameras=False) | change, task)

@@ -90,7 +90,7 @@ def itself(path):
 
 
 @pytest.mark.parametrize("put", [named_pipe, listening, endless, itself])
-def test_what_is_no_regular_file_is_one_line_wherever_it_lies(put, tmp_path):
+def test_a_special_file_is_one_line_wherever_it_lies(put, tmp_path):
     """Law: whatever file of a dataset it stands for, no command waits for it or reads without end."""
     root = canned(record, 2, cameras=True)
     before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it hangs"))

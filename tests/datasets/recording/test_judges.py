@@ -52,10 +52,10 @@ def edited(root):
 
 
 @pytest.mark.parametrize("judge", [doctor_fails, lint_defects])
-def test_what_is_recorded_passes(root, judge):
+def test_recorded_datasets_pass(root, judge):
     assert not judge(root)
 
 
 @pytest.mark.parametrize("judge", [doctor_fails, lint_defects])
-def test_what_is_edited_and_merged_passes(edited, judge):
+def test_edited_and_merged_datasets_pass(edited, judge):
     assert not judge(edited)

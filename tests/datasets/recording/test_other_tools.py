@@ -18,7 +18,7 @@ from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.repair import repair
 
 
-def test_what_lerobot_encoded_anew_is_whole(root):
+def test_videos_that_lerobot_encoded_anew_are_whole(root):
     """The first version set aside every episode of a dataset after `lerobot-edit-dataset reencode_videos`."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -44,7 +44,7 @@ def test_the_picture_of_a_card_is_ours(tmp_path):
     assert not (root / "meta" / "preview.webp").exists()
 
 
-def test_what_was_set_aside_outlives_a_recording_without_an_episode(tmp_path):
+def test_episodes_set_aside_outlive_a_recording_without_an_episode(tmp_path):
     root = record(tmp_path / "set", 2)
     for number in range(2):
         Layout(root).row(number).write_bytes(b"torn")
@@ -76,7 +76,7 @@ def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
     assert (root / "images" / "photo.png").read_text() == "mine too"
 
 
-def test_what_was_set_aside_is_overwritten_with_the_rest(tmp_path):
+def test_episodes_set_aside_are_overwritten_with_the_rest(tmp_path):
     root = record(tmp_path / "set", 3, cameras=True)
     Layout(root).data(0).write_bytes(b"torn")
     assert len(repair(root, set_aside_damaged=True).lost) == 1
@@ -108,7 +108,7 @@ def odd(columns):
     return columns["seed"] % 2 == 1
 
 
-def test_what_is_left_is_whole_and_moves_up(tmp_path):
+def test_remaining_episodes_are_whole_and_move_up(tmp_path):
     recorded = copied(tmp_path / "d", record, 5, cameras=True)
     before = {row["seed"]: read_frames(recorded, row["episode_index"]) for row in read_episodes(recorded)}
     assert drop_episodes(recorded, odd) == 2
@@ -136,7 +136,7 @@ def test_without_episodes_there_is_no_dataset(recorded):
     assert not list(recorded.parent.iterdir())
 
 
-def test_what_was_set_aside_is_not_passed_over(recorded):
+def test_episodes_set_aside_are_not_passed_over(recorded):
     Layout(recorded).damaged.mkdir()
     with pytest.raises(HandrailError, match=r"in \.damaged are episodes that were set aside"):
         drop_episodes(recorded, odd)

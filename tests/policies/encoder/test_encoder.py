@@ -68,7 +68,7 @@ def test_its_file_is_all_that_it_is(tmp_path):
     np.testing.assert_allclose(first.position, second.position, atol=5e-3)  # float16
 
 
-def test_what_it_says_moves_with_the_robot():
+def test_estimates_move_with_the_robot():
     """The same picture elsewhere is the same thing, as far from the hand."""
     one, (pictures, states) = encoder(), moments(1)
     names = one.reads.interface.state_names
@@ -124,7 +124,7 @@ def remembered(memory, of_cube):
     return memory.take({"cube": of_cube} | others, 0)[:7]
 
 
-def test_what_is_said_again_and_again_becomes_surer():
+def test_repeated_estimates_become_surer():
     memory, rng = SceneMemory(reads()), np.random.default_rng(0)
     for _ in range(50):
         now = remembered(memory, said([1.0, 2.0, 0.5] + rng.normal(0, 0.05, 3), 0.1, np.eye(3)))
@@ -132,7 +132,7 @@ def test_what_is_said_again_and_again_becomes_surer():
     np.testing.assert_allclose(now[3:], [1.0, 0.0, 0.0, 0.0], atol=1e-6)
 
 
-def test_what_the_hand_does_not_reach_stands():
+def test_a_cube_out_of_the_hand_s_reach_stands():
     """In the hand a cube is where it is seen now; elsewhere where it was seen on average."""
     held, elsewhere = SceneMemory(reads()), SceneMemory(reads())
     for x in np.linspace(0.0, 1.0, 50):
@@ -144,7 +144,7 @@ def test_what_the_hand_does_not_reach_stands():
     assert np.linalg.norm(stands[:3]) < 0.025
 
 
-def test_what_is_surer_counts_more():
+def test_surer_estimates_count_more():
     memory = SceneMemory(reads())
     remembered(memory, said([1.0, 0.0, 0.0], 0.01, np.eye(3)))
     assert remembered(memory, said([1.02, 0.0, 0.0], 0.1, np.eye(3)))[0] < 1.001
@@ -161,7 +161,7 @@ def test_one_far_word_is_not_believed_many_are():
     assert now[0] == pytest.approx(2.0, abs=0.01)
 
 
-def test_what_is_unsure_hardly_moves_what_is_known():
+def test_unsure_estimates_hardly_move_known_places():
     """A thing that stands was seen well, and is out of sight since."""
     memory = SceneMemory(reads())
     turns = {name: np.eye(3) if len(parts) == 7 else None for name, parts, _ in reads().objects}

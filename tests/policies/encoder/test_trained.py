@@ -159,7 +159,7 @@ def test_where_nobody_knows_the_truth_it_learns_what_the_encoder_says(looking, t
         read_source(dataclasses.replace(unknown, encoder=""))
 
 
-def test_what_an_encoder_never_says_is_not_learnt():
+def test_numbers_that_an_encoder_never_estimates_are_not_learnt():
     one = Encoder(Drawn(EncoderConfig(task="pick_place", image_size=SIZE)).reads)
     told = tellable(np.ones((2, len(one.reads.interface.environment_names)), np.float32), one)
     names = zip(one.reads.interface.environment_names, told[0], strict=True)

@@ -103,7 +103,7 @@ def batches(config):
 
 
 @pytest.mark.parametrize("kind", ["all", "only", "weighted"])
-def test_what_is_shown_is_what_was_asked_for(kind, takeovers, corrections, tmp_path):
+def test_the_learner_sees_the_chosen_frames(kind, takeovers, corrections, tmp_path):
     """A chunk ends with the correction where nothing else is learnt, and with the episode elsewhere."""
     config = tiny(takeovers, tmp_path / "policy", corrections=kind, steps=9, batch_size=16)
     shown = batches(config)

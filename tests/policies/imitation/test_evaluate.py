@@ -72,7 +72,7 @@ def test_parallel_rollouts_are_the_serial_ones(folder, tmp_path):
     assert untimed(json.loads((tmp_path / "e.json").read_text())) == serial
 
 
-def test_what_a_policy_draws_depends_on_the_seed_alone(folder):
+def test_random_draws_of_a_policy_depend_on_the_seed_alone(folder):
     import torch
 
     torch.manual_seed(3)
@@ -101,7 +101,7 @@ def test_resume_runs_only_what_is_missing(folder, tmp_path):
     assert policies[0].trained_on == {"episodes": 50.0, "operator_time": 312.5}
 
 
-def test_what_was_done_is_kept_when_a_rollout_fails(folder, tmp_path):
+def test_finished_rollouts_are_kept_when_one_fails(folder, tmp_path):
     class Breaking(StandIn):
         def act(self, state, environment, images, task):
             assert task == "Move the gripper to the goal frame."

@@ -120,7 +120,7 @@ def test_a_policy_may_see_pictures_instead_of_the_environment_s_state(plain):
 
 
 @pytest.mark.parametrize(("size", "mode", "numbers"), [(33, "ee", 7), (54, "switching", 11)])
-def test_what_lerobot_record_recorded_is_driven_with_its_mode(size, mode, numbers, plain):
+def test_a_policy_of_lerobot_record_is_driven_with_its_mode(size, mode, numbers, plain):
     """There robot and scene are one vector, and an action is the mode's channels."""
     reads(plain, **{"observation.state": entry("STATE", size)})
     says(plain, output_features={"action": entry("ACTION", numbers)})
@@ -145,7 +145,7 @@ def test_what_lerobot_record_recorded_is_driven_with_its_mode(size, mode, number
         ({"observation.state": 3}, "input_features: expected a table"),
     ],
 )
-def test_what_cannot_be_evaluated_says_why_in_one_line(features, words, plain):
+def test_a_policy_that_cannot_be_evaluated_is_one_line(features, words, plain):
     reads(plain, **FEATURES | features)
     with pytest.raises(HandrailError, match=words):
         evaluate(config(plain))

@@ -173,7 +173,7 @@ def test_at_the_goal_the_errors_vanish():
     np.testing.assert_allclose(around[:, rotation], np.tile(np.eye(3).ravel(), (len(around), 1)), atol=1e-6)
 
 
-def test_what_is_not_there_stays_zero():
+def test_absent_entries_stay_zero():
     columns, interface = made(4, "realised")
     _, around = observed(interface, columns)
     names = interface.observation_names[1]

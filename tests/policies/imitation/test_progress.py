@@ -74,7 +74,7 @@ def test_a_hand_that_still_goes_about_has_not_stalled():
     assert watched(about) == {"stage": "approach", "ended": "moving"}
 
 
-def test_what_was_lifted_and_is_lost_was_dropped():
+def test_a_lifted_object_that_is_lost_was_dropped():
     lost = state(CUBE.position + 0.5 * UP)
     assert watched([AROUND, LIFTED, *[lost] * 200]) == {"stage": "carry", "ended": "dropped"}
     assert watched([AWAY, AT], reason="dropped") == {"stage": "grasp", "ended": "dropped"}

@@ -112,7 +112,7 @@ def test_a_mask_becomes_the_focus_and_what_is_no_number_stays_none():
     assert act({"action": torch.full((1, size), torch.nan)})["action"].isnan().any()
 
 
-def test_what_was_not_seen_or_does_not_fit_is_said():
+def test_missing_or_misfit_observations_are_refused():
     view, act, _ = steps(PolicyInterface("realised", STATE, ENVIRONMENT, CHANNELS.names))
     with pytest.raises(HandrailError, match="to see something first"):
         act({"action": torch.zeros(1, 10)})
@@ -180,7 +180,7 @@ def test_every_robot_has_a_controller_of_its_own(interface):
         np.testing.assert_array_equal(together[:, number], alone[:, 0])
 
 
-def test_what_is_no_number_brakes(interface):
+def test_a_command_that_is_no_number_brakes(interface):
     braked, gone_on = (driven(interface, completes=True, fail_at=when) for when in (STEPS - 1, None))
     np.testing.assert_array_equal(braked[:-1], gone_on[:-1])
     assert np.abs(braked[-1] - gone_on[-1]).max() > 1e-3
@@ -208,7 +208,7 @@ def test_an_episode_that_begins_again_is_the_same_again(interface):
     np.testing.assert_array_equal([at(0.0), at(0.05)], first)
 
 
-def test_what_cannot_be_completed_is_said(interface):
+def test_an_observation_that_cannot_be_completed_is_refused(interface):
     view, _, completion = steps(interface)
     sizes = len(interface.state_names), len(interface.environment_names)
     names = ("observation.state", "observation.environment_state")

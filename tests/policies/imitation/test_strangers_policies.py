@@ -203,13 +203,13 @@ OF_AN_INTERFACE = (
 
 
 @pytest.mark.parametrize(("entry", "value"), OF_A_POLICY)
-def test_what_a_policy_says_of_itself_is_checked(entry, value, policy):
+def test_a_policy_s_description_is_checked(entry, value, policy):
     change(policy / "handrail.json", **{entry: value})
     refused(policy, entry)
 
 
 @pytest.mark.parametrize(("entry", "value"), OF_AN_INTERFACE)
-def test_what_an_interface_says_is_checked(entry, value, policy):
+def test_an_interface_s_description_is_checked(entry, value, policy):
     interface = json.loads((policy / "handrail.json").read_text())["interface"]
     change(policy / "handrail.json", interface=interface | {entry: value})
     refused(policy, f"interface: {entry}")

@@ -52,7 +52,7 @@ def test_the_dataset_in_memory_gives_the_same_tensors_as_lerobot_s_own(policy, r
     assert torch.equal(ours.batch([3, 1])["action"], batch["action"][[3, 1]])
 
 
-def test_what_is_learnt_is_what_the_interface_makes_of_the_recording(recorded, tmp_path):
+def test_the_learnt_columns_are_the_interface_s(recorded, tmp_path):
     source = read_source(tiny(recorded, tmp_path, actions="intent"))
     frames = read_frames(recorded, 1)
     assert source.interface is not None
@@ -72,7 +72,7 @@ def test_statistics_are_of_the_chosen_episodes_only(recorded, tmp_path):
     assert len(dataset.meta.lengths) == 1
 
 
-def test_what_hardly_moved_is_not_blown_up():
+def test_a_nearly_constant_column_is_not_scaled_up():
     still = {name: np.array([2.0, 2.0]) for name in ("min", "max", "q01", "q99", "q10", "q90", "mean")}
     steady = steadied(still | {"std": np.array([0.0, 0.5])})
     assert 1e-3 <= steady["std"][0] < steady["std"][1] == 0.5
@@ -123,7 +123,7 @@ def test_sizes_are_what_the_policy_and_the_training_get(recorded, tmp_path):
 
 
 @pytest.mark.parametrize("option", ["dim_model=130", "dropout=2.0", "feedforward_activation=loud"])
-def test_what_a_policy_cannot_be_built_with_is_one_line(option, recorded, tmp_path):
+def test_settings_that_no_policy_can_be_built_with_are_one_line(option, recorded, tmp_path):
     config = TrainConfig(StoredConfig(root=str(recorded)), str(tmp_path), policy_options=(option,))
     refused(config, "^policy act: ")
 
@@ -169,7 +169,7 @@ def test_wrong_settings_are_one_line_and_leave_nothing(settings, said, recorded,
     assert not (tmp_path / "policy").exists()
 
 
-def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
+def test_an_existing_output_is_kept_unless_it_may_go(trained, recorded, tmp_path):
     folder, config = trained
     refused(config, "say --resume or --overwrite")
     refused(dataclasses.replace(config, resume=True, seed=5), "--resume with --seed 5: expected 0")
@@ -190,7 +190,7 @@ def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
         ({"policy_options": ("dim_model=130",)}, "^policy act: "),
     ],
 )
-def test_what_is_there_is_not_removed_for_a_training_that_cannot_begin(wrong, said, trained, tmp_path):
+def test_an_existing_policy_is_kept_if_the_training_cannot_begin(wrong, said, trained, tmp_path):
     folder, config = trained
     config = dataclasses.replace(config, output=str(tmp_path / "policy"), steps=2, overwrite=True)
     shutil.copytree(folder.parents[2], config.folder, symlinks=True)

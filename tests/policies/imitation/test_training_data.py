@@ -51,7 +51,7 @@ def write(root, keys, dtype="float32", fps=20, robot="so101"):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_is_missing_is_said_in_one_line(case, tmp_path):
+def test_missing_columns_are_one_line(case, tmp_path):
     keys, policy, said = CASES[case]
     options = {"actions": "recorded", "policy": policy, "policy_options": ()}
     refused(tiny(canned(write, keys), tmp_path / "policy", **options), f"^dataset .*{said}")
@@ -63,7 +63,7 @@ def test_a_dataset_of_another_tool_needs_its_columns_as_they_are(tmp_path):
 
 
 @pytest.mark.parametrize(("fps", "robot"), [(5, "SO-100 (follower)"), (120, "me/so100")])
-def test_whatever_its_rate_and_its_robot_s_name_a_policy_can_be_read_again(fps, robot, tmp_path):
+def test_a_policy_of_any_rate_and_robot_s_name_can_be_read_again(fps, robot, tmp_path):
     root = canned(write, (STATE, "action"), fps=fps, robot=robot)
     policy = train(tiny(root, tmp_path / "policy", steps=1, actions="recorded"))
     assert read_meta(policy).fps == fps
@@ -77,7 +77,7 @@ def test_a_policy_of_another_rate_is_no_beginning(tmp_path):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_what_is_no_number_is_not_learnt(value, tmp_path):
+def test_nan_is_not_learnt(value, tmp_path):
     root = shutil.copytree(canned(write, (STATE, "action")), tmp_path / "set")
     (file,) = root.glob("data/**/*.parquet")
     table = pq.read_table(file)
@@ -153,7 +153,7 @@ def test_an_intent_of_several_modes_is_refused(modes, said, tmp_path):
         assert read_meta(train(tiny(**config, steps=1, mode="ee"))).mode == "ee"
 
 
-def test_what_a_dataset_lacks_is_not_fetched_from_anywhere(tmp_path):
+def test_missing_files_of_a_dataset_are_not_fetched(tmp_path):
     root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
     sorted(root.rglob("*.mp4"))[0].unlink()
     refused(tiny(root, tmp_path / "policy", images=True), "was copied in part: 1 of 2 episodes")

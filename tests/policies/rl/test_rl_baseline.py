@@ -116,7 +116,7 @@ def test_the_mean_of_actors_lies_between_them():
 
 
 @pytest.mark.parametrize("spoil", ["text", "missing", "cut", "nan", "pickle"])
-def test_what_is_no_actor_is_refused(tmp_path, spoil):
+def test_a_file_that_is_no_actor_is_refused(tmp_path, spoil):
     path, actor = tmp_path / "actor.npz", random_actor()
     weights, biases = list(actor.weights), list(actor.biases)
     arrays = {f"weight_{i}": value for i, value in enumerate(weights)}

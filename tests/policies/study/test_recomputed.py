@@ -18,7 +18,7 @@ DESIGNS = {"factors": RESULTS / "teleop_modes_factors.toml", "answer": PRESETS /
 
 
 @pytest.mark.parametrize("study", DESIGNS)
-def test_what_was_declared_comes_out_as_published(study):
+def test_declared_contrasts_come_out_as_published(study):
     archive, design = RESULTS / f"teleop_modes_{study}.tar.xz", DESIGNS[study]
     done = subprocess.run(
         [sys.executable, RESULTS / "recompute.py", archive, design],
@@ -158,7 +158,7 @@ def test_a_contact_after_the_hand_got_nearer_no_more_is_told_apart(tmp_path):
         (("success.py", *[RESULTS / "teleop_modes_factors.tar.xz"] * 2), "expected FIGURE.png"),
     ],
 )
-def test_what_a_script_cannot_use_is_one_line(script, told):
+def test_settings_that_a_script_cannot_use_are_one_line(script, told):
     name, *files = script
     done = subprocess.run(
         [sys.executable, RESULTS / name, *files], capture_output=True, text=True, check=False

@@ -112,7 +112,7 @@ def test_a_failed_job_is_told_by_what_it_said_this_time(tmp_path, preset, capsys
     assert not any("reach/ee/0" in name for name in done)
     said = capsys.readouterr().err.replace("\n", " ")
     assert "failed: collect/reach/ee/0: of today" in said
-    assert "failed: policy/reach/ee/0/realised-time: what it needs failed" in said
+    assert "failed: policy/reach/ee/0/realised-time: a job that it needs failed" in said
     assert "last week" not in said
 
 
@@ -146,7 +146,7 @@ def test_a_second_study_in_a_folder_is_told_what_the_first_is(tmp_path, preset):
 
 
 @pytest.mark.parametrize("missing", ["torch", "accelerate"])
-def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path, preset, monkeypatch):
+def test_a_missing_package_is_named_before_anything_begins(missing, tmp_path, preset, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: name != missing or None)
     starter = Starter()
     with pytest.raises(HandrailError, match=f"handrail-study: expected {missing}"):
@@ -198,7 +198,7 @@ def test_another_text_is_one_line(tmp_path, data):
     [b"\xff\xfe", b"", b"a = " + b"[" * 100_000, b"a = " + b"9" * 10_000, b"#" * 2**21],
     ids=["bytes", "empty", "deep", "digits", "large"],
 )
-def test_what_is_no_design_is_one_line(content, tmp_path):
+def test_a_file_that_is_no_design_is_one_line(content, tmp_path):
     path = tmp_path / "study.toml"
     path.write_bytes(content)
     refused("--preset", path, "--output", tmp_path / "study", name="study")

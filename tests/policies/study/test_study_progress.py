@@ -33,7 +33,7 @@ from handrail.policies.study.work import begin, do, work
         (lambda design: dataclasses.replace(design, seed=7), "all"),
     ],
 )
-def test_what_other_settings_made_is_removed_and_nothing_else(change, goes, tmp_path, preset):
+def test_results_of_other_settings_are_removed_and_nothing_else(change, goes, tmp_path, preset):
     design, layout, found = everything(tmp_path, preset)
     names = {"collect/reach/ee/0", "policy/reach/ee/0/realised-time"}
     collect, policy = (job for job in found if job.name in names)
@@ -54,7 +54,7 @@ def test_rollouts_of_a_policy_that_is_gone_go_too(tmp_path, preset):
     assert not layout.evaluation(job.policy, "nominal").exists()
 
 
-def test_what_nobody_knows_the_settings_of_is_neither_used_nor_removed(tmp_path, preset):
+def test_results_of_unknown_settings_are_neither_used_nor_removed(tmp_path, preset):
     design, layout, found = everything(tmp_path, preset)
     for job in found[:1] + [job for job in found if job.policy][:1]:
         layout.begun(job).unlink()
@@ -170,7 +170,7 @@ def test_the_report_has_nothing_of_other_settings_and_counts_what_is_missing(tmp
     assert "not done yet" not in page.read_text()
 
 
-def test_what_is_large_may_go_and_is_made_again_only_where_it_is_needed(tmp_path, preset):
+def test_large_files_may_go_and_are_made_again_only_where_needed(tmp_path, preset):
     design, layout, _ = everything(tmp_path, preset)
     for folder in ("datasets", "policies", "logs"):
         shutil.rmtree(layout.root / folder, ignore_errors=True)

@@ -109,7 +109,7 @@ def test_draws_that_agree_by_chance_are_not_sure(gathered):
 
 
 @pytest.mark.parametrize("label", LABELS)
-def test_what_is_planned_is_detected_in_four_of_five_studies(label):
+def test_the_planned_difference_is_detected_in_four_of_five_studies(label):
     """Policies drawn with the design's spread and the worst rollouts, an effect as large as planned for."""
     rng, found, studies = np.random.default_rng(3), 0, 2000
     design = replace(DESIGN, draws=8, rollouts=50)

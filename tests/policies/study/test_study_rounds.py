@@ -117,7 +117,7 @@ def unfinished(layout, job):
 
 @pytest.mark.parametrize("damage", [gone, unfinished])
 @pytest.mark.parametrize("only", ["", "reach/helped-2/0"])
-def test_what_is_gone_is_made_again_as_far_back_as_it_is_needed(damage, only, tmp_path, preset):
+def test_lost_files_are_made_again_as_far_back_as_needed(damage, only, tmp_path, preset):
     design, layout, found = everything(tmp_path, preset)
     by_name = {job.name: job for job in found}
     damage(layout, by_name[POLICY.format("helped-1")])

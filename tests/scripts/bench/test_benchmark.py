@@ -137,7 +137,7 @@ def test_a_planner_that_sees_the_hand_gets_it_there():
         assert episode["final_position_error"] <= 0.003
 
 
-def test_who_knows_the_lag_of_the_low_pass_does_not_ring():
+def test_an_operator_with_the_low_pass_s_lag_does_not_ring():
     """A planner that does not know it swings about the goal, and the error grows while it settles."""
     config = BenchmarkConfig(goals=2, early_stop=False, closed_loop=True)
     known = BASELINES["mpc"]

@@ -1,8 +1,8 @@
 """Python loads this first in every process of a command under test: a slow disk and a clock that jumps.
 
-What is so now stands in the file that HANDRAIL_SOAK names: `{"delay": seconds, "shift": seconds}`. Every call
-that waits for the disk then takes so much longer, and the wall clock is so far off. The monotonic clock is
-left alone, as a real jump leaves it.
+The present values stand in the file that HANDRAIL_SOAK names: `{"delay": seconds, "shift": seconds}`. Every
+call that waits for the disk then takes so much longer, and the wall clock is so far off. The monotonic clock
+is left alone, as a real jump leaves it.
 """
 
 import contextlib

@@ -212,7 +212,7 @@ def test_any_channels_can_be_owned(operator):
     assert intent.raw.switches == 1
 
 
-def test_what_was_judged_is_saved_before_the_recording_ends(operator):
+def test_a_judged_episode_is_saved_before_the_recording_ends(operator):
     """However soon one word follows the other: no end overtakes a judgement."""
     begin(operator)
     for what in ("success", "quit"):
@@ -235,7 +235,7 @@ def test_an_episode_that_runs_is_paused_before_it_is_quit(operator):
 
 @pytest.mark.parametrize("supervises", [False, True])
 @pytest.mark.parametrize("loss", ["late", "hidden"])
-def test_whoever_supervises_presses_start_after_a_loss(supervises, loss):
+def test_a_supervisor_presses_start_after_a_loss(supervises, loss):
     """A policy would drive on by itself: that all is let go is how they supervise."""
     CLOCK[0] = 100.0
     operator = Person(MODEL, fitting(MODES, 1), "ee", lambda: CLOCK[0], supervises)

@@ -33,7 +33,7 @@ def test_wrong_numbers_are_refused(name, value):
 
 @pytest.mark.parametrize("model", [ONE, TWO], ids=["one hand", "two hands"])
 @pytest.mark.parametrize("name", NAMES)
-def test_whatever_is_wished_shares_are_from_0_to_1_and_owners_do_not_contradict(name, model):
+def test_for_any_wish_shares_are_from_0_to_1_and_owners_do_not_contradict(name, model):
     rng, decides, groups = np.random.default_rng(3), arbiter(name, model), Groups(channels_of(model))
     size, time = groups.channels.size, 0.0
     for _ in range(400):
@@ -58,7 +58,7 @@ def test_whatever_is_wished_shares_are_from_0_to_1_and_owners_do_not_contradict(
 
 @pytest.mark.parametrize("doubt", [0.0, 5.0])
 @pytest.mark.parametrize("name", NAMES)
-def test_what_a_person_begins_to_move_is_theirs_at_once(name, doubt):
+def test_a_person_owns_at_once_channels_that_they_begin_to_move(name, doubt):
     course = Course(arbiter(name))
     before = course.go(RESTS, POLICY, 5.0, realised=POLICY.values)
     assert not np.any(before.person[RESTS.mask])

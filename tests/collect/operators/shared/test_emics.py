@@ -32,7 +32,7 @@ def switches(found):
 @pytest.mark.parametrize("size", [0.05, 0.1, 2.0, 1e6])
 @pytest.mark.parametrize("made", [-0.5, 0.0, 0.4, 0.6, 1.0, 1.5])
 @pytest.mark.parametrize("level", ["policy", "person"])
-def test_who_makes_too_little_of_the_policy_s_way_loses_the_robot(level, made, size):
+def test_a_driver_with_too_little_of_the_policy_s_way_loses_the_robot(level, made, size):
     """Whatever its size: E = 1 - made, and the threshold is 0.5."""
     policy, course = asks("base", "ee", value=size), Course(arbiter("emics", error=0.5))
     done = made * min(size, 1.0) * policy.mask  # of nine channels: a wish is cut to 3
@@ -65,7 +65,7 @@ def test_a_policy_that_twitches_takes_nothing():
     assert set(swayed(course, PERIOD) + swayed(course, 1.0, still)) == {"person"}
 
 
-def test_whoever_drives_anew_is_judged_anew():
+def test_a_new_driver_is_judged_anew():
     """The policy failed, the person does well."""
     course = Course(arbiter("emics", window=2.0, dwell=0.5))
     while drives(course.go(RESTS, POLICY, realised=-POLICY.values)) == "policy":
@@ -160,7 +160,7 @@ def test_one_who_was_there_a_moment_ago_is_given_it(name):
     assert "nobody" in found
 
 
-def test_who_goes_away_leaves_the_robot_to_a_policy_that_wants_to_stand():
+def test_an_absent_person_leaves_the_robot_to_a_policy_that_wants_to_stand():
     """There is no error then, and emics leaves it to nobody."""
     for name, last in (("emics", "nobody"), ("hier_emics", "policy")):
         course, calm = Course(arbiter(name, away=10.0)), asks("base", "ee", value=0.0)

@@ -46,7 +46,7 @@ def test_more_that_is_owned_takes_more_and_at_least_itself(model, seed):
         (["joint.torso_lift_joint"], [], ["ee", "pair", "base", "left.arm"]),
     ],
 )
-def test_what_contradicts_is_taken_and_what_can_be_made_up_for_is_kept(owned, lost, kept):
+def test_contradicting_channels_are_taken_and_others_kept(owned, lost, kept):
     taken = GROUPS.taken(mask(*owned))
     assert np.all(taken[mask(*lost)])
     assert not np.any(taken & mask(*kept) & ~mask(*owned))

@@ -39,7 +39,7 @@ def status(intent, time):
 
 @pytest.mark.parametrize("event", EpisodeEvent)
 @pytest.mark.parametrize("name", NAMES)
-def test_what_the_person_says_of_the_episode_comes_first(name, event):
+def test_a_person_s_word_on_the_episode_comes_first(name, event):
     """The policy is not even asked, whoever drives."""
     for before in (RESTS, PUSHES):
         both = Both(name)
@@ -153,7 +153,7 @@ def test_an_unsure_policy_and_a_person_who_rests_brake_the_robot():
         replace(asks("ee.vx", "ee.wz"), frames=Frames(tool="tool")),
     ],
 )
-def test_what_cannot_be_shared_is_the_person_s_alone(name, asked):
+def test_an_intent_that_cannot_be_shared_is_the_person_s_alone(name, asked):
     both = Both(name, shares=lambda mode: mode != "direct")
     both.act(RESTS, replace(DRIVES, grippers=(1.0,)), 1.0)
     found = both.act(asked)

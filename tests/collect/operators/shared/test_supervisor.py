@@ -77,11 +77,11 @@ def test_a_mode_that_does_not_steer_the_hand_throughout_is_refused(env, mode):
         ((*REAL, "--operator", "scripted"), "--operator scripted: expected a person beside a policy"),
     ],
 )
-def test_what_nobody_could_supervise_is_refused(tmp_path, flags, told):
+def test_a_task_that_nobody_could_supervise_is_refused(tmp_path, flags, told):
     refused(tmp_path / "set", *flags, told=told)
 
 
-def test_what_a_policy_may_stand_beside_is_said_of_this_robot(env):
+def test_modes_beside_a_policy_are_listed_for_this_robot(env):
     """A mode of two hands is no choice of a robot with one."""
     with pytest.raises(HandrailError, match="expected one that the MPC completes") as error:
         share(RecordConfig(task="reach", mode="direct", policy=("none",)), supervisor(env), env)
