@@ -23,6 +23,11 @@ def message_of(error: BaseException) -> str:
     return words if len(words) <= _LONGEST_MESSAGE else f"{words[:_LONGEST_MESSAGE]} …"
 
 
+def first_line(error: BaseException) -> str:
+    """Return the first line of an exception's text."""
+    return str(error).partition("\n")[0]
+
+
 def not_installed(wanted_by: str, module: str, extra: str = "") -> HandrailError:
     """Return the error for a module that is not installed, with the command that installs it.
 

@@ -30,6 +30,7 @@ from handrail.collect.cockpit.messages import LARGEST
 from handrail.collect.cockpit.pipe import Kind, Pipe
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.user_folder import user_folder
 
 _PAGE = Path(__file__).parent / "page"
 _TRIES = 20  # ports after the one that is wanted
@@ -205,8 +206,7 @@ def _certificate(config: CockpitConfig) -> tuple[Path, Path]:
     if config.certificate:
         folder = Path(config.certificate).expanduser()
         return folder / "cert.pem", folder / "key.pem"
-    place = Path(os.environ.get("XDG_CONFIG_HOME", "~/.config")).expanduser() / "handrail" / "cockpit"
-    return certificate(config.host, place)
+    return certificate(config.host, user_folder("XDG_CONFIG_HOME") / "cockpit")
 
 
 async def _end(server: uvicorn.Server, gone: asyncio.Event, hub: Hub) -> None:

@@ -9,7 +9,7 @@ import tyro
 
 from handrail.collect.config import SessionConfig, StoredConfig
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.flags import check_file, only_one
+from handrail.collect.flags import check_file
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.editing.config import EditConfig
@@ -134,8 +134,6 @@ class PushConfig:
 class DemoConfig:
     """Record a few real demonstrations and show what came out."""
 
-    root: str = ""
-    """The same as FOLDER."""
     episodes: int = 5
     """How many."""
     overwrite: bool = False
@@ -146,4 +144,4 @@ class DemoConfig:
     @property
     def folder(self) -> Path:
         """The folder of the demo."""
-        return Path(only_one(self.place, self.root, "--root") or "outputs/demo").expanduser()
+        return Path(self.place or "outputs/demo").expanduser()

@@ -8,7 +8,6 @@ from typing import Any
 
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.operators.operator import EpisodeEvent
-from handrail.collect.user_study.design import DEMO_NOTE
 from handrail.collect.user_study.driving import Driving
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.forms import CONSENT, REFUSED, form
@@ -16,6 +15,7 @@ from handrail.collect.user_study.items import Answer, Form, Item
 from handrail.collect.user_study.participant import Interrupted, Noted, Participant, Practised
 from handrail.collect.user_study.plan import Step, pairs_rng, plan, practice_seed, trial_seed
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.scores import DEMO
 
 NEXT, PAUSE = ":next", ":pause"  # answers of the buttons; no question is called so
 _GO_ON = "on"
@@ -209,4 +209,4 @@ class Conductor:
 
     @property
     def _demo_note(self) -> str:
-        return DEMO_NOTE if self._study.demo else ""
+        return DEMO if self._study.demo else ""

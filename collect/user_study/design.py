@@ -14,8 +14,8 @@ from handrail.controllers.errors import HandrailError, check_known, shown
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import Count, Name, Number, Text
+from handrail.datasets.comparison.scores import DEMO, PEOPLE
 
-DEMO_NOTE = "demo data: no people took part"
 FORMS = ("tlx", "tlx_raw", "sus", "questions")
 ALLOWED = ("mode", "mask", "undo", "discard", "restart", "success")
 _OF_KIND = {
@@ -146,7 +146,7 @@ class UserStudy:
     @property
     def source(self) -> str:
         """The origin of the data, as every table says it."""
-        return DEMO_NOTE if self.demo else "people"
+        return DEMO if self.demo else PEOPLE
 
     def recording(self, mode: str, task: str, folder: Path) -> RecordConfig:
         """Return the settings with which a task is recorded in a mode, into a dataset new or added to."""

@@ -15,6 +15,7 @@ from pathlib import Path
 import casadi as ca
 
 from handrail.controllers.numerics.first_use import compiling
+from handrail.controllers.user_folder import user_folder
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 _TIMEOUT = 120.0  # [s]
@@ -30,7 +31,7 @@ def compiled(function: ca.Function) -> ca.Function:
     source = generator.dump()
     digest = hashlib.sha256(f"{compiler} {_FLAGS} {source}".encode()).hexdigest()[:24]
     try:
-        library = _folder() / f"{function.name()}-{digest}.so"
+        library = user_folder("XDG_CACHE_HOME") / f"{function.name()}-{digest}.so"
         if not library.is_file():
             _build(source, library, compiler)
         return ca.external(function.name(), str(library))
@@ -48,7 +49,3 @@ def _build(source: str, library: Path, compiler: str) -> None:
         command = [compiler, *_FLAGS, str(code), "-o", str(built), "-lm"]
         subprocess.run(command, check=True, capture_output=True, timeout=_TIMEOUT)
         os.replace(built, library)
-
-
-def _folder() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "handrail"

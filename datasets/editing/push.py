@@ -131,8 +131,7 @@ def upload(push: Upload) -> None:
     except HandrailError:
         raise
     except Exception as error:  # of the hub's client and the network
-        said = message_of(error).partition("\n")[0]
-        raise HandrailError(f"--upload: the hub did not take {push.repo_id}: {said}") from error
+        raise HandrailError(f"--upload: the hub did not take {push.repo_id}: {message_of(error)}") from error
 
 
 def copy(push: Upload) -> None:

@@ -18,7 +18,7 @@ import av.error
 import numpy as np
 from numpy.typing import NDArray
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, first_line
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import Statistics, image_levels, image_stats
@@ -58,8 +58,7 @@ def whole_mp4(path: Path) -> Iterator[None]:
     try:
         yield
     except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: also text that is none
-        said = str(error).partition("\n")[0]
-        raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {said}") from error
+        raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {first_line(error)}") from error
 
 
 def place_of(shown: Any, fps: int) -> int:

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 import pyarrow as pa
 
-from handrail.controllers.errors import HandrailError, check_known
+from handrail.controllers.errors import HandrailError, check_known, first_line
 from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.format.episode_rows import EpisodeRow, plain_names, row_files, table_rows
 from handrail.datasets.format.info_file import InfoFile, fill
@@ -237,7 +237,7 @@ def _values(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
 
 
 def _torn(path: Path, error: Exception, advice: str = _DAMAGED) -> HandrailError:
-    reason = "no such file" if isinstance(error, FileNotFoundError) else str(error).partition("\n")[0]
+    reason = "no such file" if isinstance(error, FileNotFoundError) else first_line(error)
     return HandrailError(f"{str(path)!r} cannot be read ({reason});{advice}")
 
 

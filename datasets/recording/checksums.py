@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from handrail.controllers.user_folder import user_folder
 from handrail.datasets.format.metadata import Checksum
 from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.strict_json import known_json
@@ -49,5 +50,4 @@ class Checksums:
 
 def memory_folder() -> Path:
     """Return where it is kept what was checked, and when."""
-    cache = Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
-    return cache / "handrail" / "checksums"
+    return user_folder("XDG_CACHE_HOME") / "checksums"

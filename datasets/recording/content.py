@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, first_line
 from handrail.datasets.format.data_file import DataFile, data_files
 from handrail.datasets.format.episode_rows import EpisodeRows
 from handrail.datasets.format.manifest import Manifest
@@ -39,11 +39,6 @@ def content_faults(path: Path, name: str, manifest: Manifest, rows: EpisodeRows)
                 fault = first_line(error)
             faults.append(fault)
     return faults
-
-
-def first_line(error: BaseException) -> str:
-    """Return the first line of what an error says."""
-    return str(error).partition("\n")[0]
 
 
 def _pictures_fault(path: Path, key: str, manifest: Manifest, record: EpisodeRecord, alone: bool) -> str:

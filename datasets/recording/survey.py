@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, first_line
 from handrail.datasets.format.episode_rows import EpisodeRows, count_rows, row_files
 from handrail.datasets.format.layout import Layout, episode_of
 from handrail.datasets.format.manifest import Manifest
@@ -18,7 +18,7 @@ from handrail.datasets.format.metadata import Checksum, EpisodeRecord, Totals
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.tables import UNREADABLE
 from handrail.datasets.recording.checksums import Checksums
-from handrail.datasets.recording.content import content_faults, first_line
+from handrail.datasets.recording.content import content_faults
 from handrail.datasets.storage.strict_json import read_json
 
 _SHOWN = 3  # faults in one line

@@ -80,7 +80,6 @@ def test_a_name_that_none_can_have_is_one_line(name, word, tmp_path, monkeypatch
 ONE_WAY = [  # command, ways to say the same, both ways at once
     *((name, ("a", "--dataset.root a", "--dataset.root=a"), "a --dataset.root b") for name in STORED),
     ("evaluate", ("a b", "a,b", "--policy a b", "--policy a,b"), "a --policy b"),
-    ("demo", ("a", "--root a"), "a --root b"),
 ]
 
 

@@ -46,7 +46,7 @@ class Fetch(Drawer):
         way = [rng.uniform(0.10, 0.14) - depth / 2, side * rng.uniform(0.08, 0.14), FLOOR]
         x, y, bottom = shut.position + shut.rotation @ way
         slide = Slide(np.array([-1.0, 0.0, 0.0]), _TRAVEL, closing=_SPRING)
-        thing = cube("cube", x, y, bottom, yaw, _EDGE, _MASS)
+        thing = cube(x, y, bottom, yaw, _EDGE, _MASS)
         return replace(start, scene=replace(start.scene, objects=(body, replace(shut, slide=slide), thing)))
 
     def features(self, state: TaskState) -> FloatArray:

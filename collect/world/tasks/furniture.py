@@ -58,14 +58,14 @@ def table(name: str, x: float, y: float, size: tuple[float, float, float], scale
 
 
 def cube(
-    name: str, x: float, y: float, bottom: float, yaw: float, edge: float, mass: float, length: float = 0.0
+    x: float, y: float, bottom: float, yaw: float, edge: float, mass: float, length: float = 0.0
 ) -> SceneObject:
     """Return a cube that can be grasped, standing at height `bottom` [m], turned by `yaw` [rad].
 
     With a `length` it is a bar, so long along its y [m].
     """
     looks, size = {"rgba": _RED, "turns": 2 if length else 4}, [edge, length or edge, edge]
-    return standing(name, box(size), x, y, bottom, yaw, mass=mass, friction=1.0, **looks)
+    return standing("cube", box(size), x, y, bottom, yaw, mass=mass, friction=1.0, **looks)
 
 
 def open_bin(

@@ -130,7 +130,7 @@ def _sample_cube(on: SceneObject, world: WorldScale, rng: np.random.Generator, l
     y = on.position[1] + world.scale * rng.uniform(-0.15, 0.15)
     yaw = rng.uniform(-np.pi / 4, np.pi / 4)  # a cube looks the same every quarter turn
     edge = _SLIM * world.cube if length else world.cube
-    return cube("cube", x, y, on.top, yaw, edge, _MASS * world.grip**3, length)
+    return cube(x, y, on.top, yaw, edge, _MASS * world.grip**3, length)
 
 
 def _sample_bin(on: SceneObject, world: WorldScale, rng: np.random.Generator, length: float) -> SceneObject:

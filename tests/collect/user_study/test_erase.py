@@ -8,9 +8,9 @@ import pytest
 from datasets_guillotine import Guillotine
 from user_study_helpers import erased, session, study_folder, table, trials, wanted
 
-from handrail.collect.user_study.design import DEMO_NOTE
 from handrail.collect.user_study.exports import COLUMNS
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.scores import DEMO
 from handrail.datasets.reading.check import check_report
 
 GUILLOTINE = Guillotine()
@@ -84,17 +84,17 @@ def test_an_erasure_that_is_killed_anywhere_is_finished_by_the_next(two, tmp_pat
 
 def test_every_table_explains_its_columns_and_says_that_nobody_took_part(two):
     readme = (two.exports / "README.txt").read_text()
-    assert DEMO_NOTE in readme
+    assert DEMO in readme
     for name, columns in COLUMNS.items():
         rows = table(two, name)
         assert rows
-        assert all(list(row) == list(columns) and row["source"] == DEMO_NOTE for row in rows)
+        assert all(list(row) == list(columns) and row["source"] == DEMO for row in rows)
         assert json.loads((two.exports / f"{name}.json").read_text())["demo"] is True
         assert f"\n{name}\n" in readme
         assert all(f"  {column} " in readme for column in columns)
     for name in ("P001", "P002"):
         for file in ("session.json", "answers.json"):
-            assert json.loads((two.root / "participants" / name / file).read_text())["source"] == DEMO_NOTE
+            assert json.loads((two.root / "participants" / name / file).read_text())["source"] == DEMO
     assert json.loads((two.root / "study.json").read_text())["demo"] is True
 
 

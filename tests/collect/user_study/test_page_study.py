@@ -10,8 +10,8 @@ from participant_driver import REMARK, ParticipantDriver
 from playwright.sync_api import expect
 from user_study_helpers import study_folder
 
-from handrail.collect.user_study.design import DEMO_NOTE
 from handrail.collect.user_study.questionnaires import PAIRS, sus_score, tlx_raw, tlx_weighted
+from handrail.datasets.comparison.scores import DEMO
 
 pytestmark = pytest.mark.slow
 MODES, TASKS = ("ee", "base+ee", "direct"), ("reach", "pick_place")
@@ -35,7 +35,7 @@ when = "end"
 def running(root, name):
     """Run a participant's session; give its process and address."""
     with started("user-study", "run", root, name) as (process, address, said):
-        assert DEMO_NOTE in said
+        assert DEMO in said
         yield process, address
 
 
@@ -89,7 +89,7 @@ def test_a_study_of_two_through_the_page_killed_and_resumed(new_page, tmp_path):
     tables = {
         name: pandas.read_csv(root / "exports" / f"{name}.csv") for name in ("answers", "scores", "trials")
     }
-    assert all(set(table["source"]) == {DEMO_NOTE} for table in tables.values())
+    assert all(set(table["source"]) == {DEMO} for table in tables.values())
     for row in tables["scores"].itertuples():
         score = computed(said[row.participant], row.condition)[row.score]
         assert pandas.isna(row.value) if score is None else row.value == pytest.approx(score), row

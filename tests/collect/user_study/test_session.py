@@ -21,11 +21,12 @@ from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.user_study.conduct import Ending
 from handrail.collect.user_study.config import StudySessionConfig
-from handrail.collect.user_study.design import DEMO_NOTE, Practice
+from handrail.collect.user_study.design import Practice
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import plan, practice_seed, trial_seed
 from handrail.collect.user_study.run import study_session
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.scores import DEMO
 
 GUILLOTINE = Guillotine()
 
@@ -52,7 +53,7 @@ def test_a_session_does_everything_once_in_the_participant_s_order(tmp_path):
     ]
     assert list(who.forms) == [step.key for step in steps if step.kind == "form"]
     assert desk.titles[0] == study.title
-    assert all(card["note"] == DEMO_NOTE for card in desk.cards)
+    assert all(card["note"] == DEMO for card in desk.cards)
     again, _, track = session(folder, "P001")
     assert again is Ending.DONE
     assert not track.done
