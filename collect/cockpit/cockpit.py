@@ -183,7 +183,7 @@ class Cockpit:
             "shapes": stage.shapes(compiled),
             "meshes": digest,
             "task": env.task.description,
-            "horizon": env.task.horizon,
+            "time_limit": env.task.time_limit,
             "robot": robot.name,
             "channels": channels.names,
             "joints": self._model.joints,

@@ -94,7 +94,7 @@ class Snapshots:
             "aim": self._aim(view.task),
             "judge": None if env.real else env.task.outcome(view.task).success,
             "undo_takes": 0.0 if env.real else round(state.time - self._undo_to, 1),
-            "left": round(env.task.horizon - state.time, 1),
+            "left": round(env.task.time_limit - state.time, 1),
             "phase": person.phase.value,
             "poses": stage.poses(env.simulation.data),
             "hand": person.meaning.hands.index(setting.hand),

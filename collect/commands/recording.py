@@ -8,10 +8,9 @@ from dataclasses import asdict, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from handrail.collect.config import FoundDatasetConfig, RecordConfig
 from handrail.collect.operators.operator import EpisodeEvent, Operator
+from handrail.collect.seeds import episode_seed
 from handrail.collect.session.build import build_env, build_modes, build_session, session_features
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import COLUMN as SETTINGS
@@ -145,17 +144,6 @@ class Recording:
         root, seed = self._config.dataset.folder, self._config.seed
         rows = read_episodes(root) if is_dataset(Layout(root)) else []
         return {row.get("seed") for n, row in enumerate(rows) if row.get("seed") != episode_seed(seed, n)}
-
-
-def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:
-    """Return the seed of an episode: far apart for every seed and number.
-
-    Args:
-        seed: of the recording.
-        episode: its number.
-        attempt: how many with this number the operator has thrown away.
-    """
-    return int(np.random.SeedSequence([seed, episode, attempt]).generate_state(1)[0])
 
 
 def session_columns(config: RecordConfig) -> dict[str, Scalar]:

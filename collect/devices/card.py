@@ -29,7 +29,7 @@ class Card:
     tables: Sequence[ControlMap]
     """Maps of the devices, for the help."""
     task: str = ""
-    horizon: float = 0.0
+    time_limit: float = 0.0
     """Time limit of the episode [s]."""
     before: str = ""
     """The outcome of the last episode."""
@@ -71,7 +71,7 @@ class Card:
         for hand, closed in zip(meaning.hands, self.grips, strict=True):
             chosen.append(f"{hand} gripper {'closed' if closed > 0.5 else 'open'}".strip())
         chosen += [] if self.apart is None else [f"leader {np.degrees(self.apart):.0f}° from the arm"]
-        left = max(0.0, self.horizon - view.state.time)
+        left = max(0.0, self.time_limit - view.state.time)
         return (
             f"{self.task}  {left:.0f} s left" + (f"  last episode {self.before}" if self.before else ""),
             self.trouble or self._advice() + (f"  braking: {self.brakes}" if self.brakes else ""),

@@ -84,7 +84,7 @@ class LocalPerson:
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Show the task of a new episode."""
-        self._card.task, self._card.horizon = env.task.description, env.task.horizon
+        self._card.task, self._card.time_limit = env.task.description, env.task.time_limit
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""

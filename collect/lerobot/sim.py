@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 from lerobot.robots import Robot
 
-from handrail.collect.commands.recording import episode_seed
 from handrail.collect.lerobot.configs import HandrailSimConfig
 from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, ModeAction, mode_loop, pressed
 from handrail.collect.lerobot.names import POSITION, lerobot_name
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.scripted.steering import FOLLOW
-from handrail.collect.seeds import evaluation_seed
+from handrail.collect.seeds import episode_seed, evaluation_seed
 from handrail.collect.session.build import build_env, build_mode
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError

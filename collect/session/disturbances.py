@@ -96,16 +96,16 @@ class Push:
         object.__setattr__(self, "direction", frozen(self.direction))
 
 
-def sample_pushes(seed: int, horizon: float) -> tuple[Push, ...]:
+def sample_pushes(seed: int, time_limit: float) -> tuple[Push, ...]:
     """Draw the pushes of an episode; its seed alone says when, where and which way.
 
     Args:
         seed: of the episode.
-        horizon: its longest duration [s].
+        time_limit: its longest duration [s].
     """
     rng = np.random.default_rng([seed, _STREAM])
     pushes, start = [], rng.uniform(*_FIRST)
-    while start < horizon:
+    while start < time_limit:
         hand = bool(rng.random() < 0.5)
         direction = rng.normal(size=3)
         if not hand:
@@ -136,7 +136,7 @@ class Pusher:
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Draw the pushes of an episode."""
         self._simulation = env.simulation
-        self._pushes = sample_pushes(seed, env.task.horizon)
+        self._pushes = sample_pushes(seed, env.task.time_limit)
         effort, base = env.model.description.limits.effort, len(env.model.description.base.joints)
         held = float(np.min(effort[: min(base, 2)])) if base else 0.0  # one that stands fixed: at the hand
         self._base = held * (1.0 + _BASE_EXCESS * self._size)

@@ -26,7 +26,7 @@ from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.storage.atomic import explained, remove, sync, write_whole
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 from handrail.datasets.storage.strict_json import load_json, write_json
 
 _EXAMPLE = Path(__file__).parent / "example.toml"
@@ -82,10 +82,10 @@ class StudyFolder:
         with explained(f"cannot write {str(self._frozen)!r}"):
             write_json(self._frozen, content | {"frozen": now()})
 
-    def lock(self) -> DatasetLock:
+    def lock(self) -> FolderLock:
         """Return the right to change the study."""
         with explained(f"cannot write {str(self.root)!r}"):
-            return DatasetLock(self.root / ".handrail", "study", "handrail-user-study")
+            return FolderLock(self.root / ".handrail", "study", "handrail-user-study")
 
     def participants(self) -> dict[str, Participant]:
         """Return everybody who has begun, by id."""

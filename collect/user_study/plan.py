@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from handrail.collect.seeds import mixed_seed
 from handrail.collect.user_study.design import UserStudy
 from handrail.collect.user_study.forms import CONSENT, END, START, form_names
 
@@ -102,19 +103,15 @@ def _steps(study: UserStudy, modes: tuple[str, ...], tasks: tuple[str, ...]) -> 
 
 def trial_seed(study: UserStudy, task: str, trial: int) -> int:
     """Return the seed of a trial: the same scene in every mode and for every participant."""
-    return _seed(study.seed, _TRIAL, study.tasks.index(task), trial)
+    return mixed_seed(study.seed, _TRIAL, study.tasks.index(task), trial)
 
 
 def practice_seed(study: UserStudy, mode: str, task: str, attempt: int) -> int:
     """Return the seed of a trial of practice: a scene that no trial has."""
-    return _seed(study.seed, _PRACTICE, study.tasks.index(task), study.modes.index(mode), attempt)
+    return mixed_seed(study.seed, _PRACTICE, study.tasks.index(task), study.modes.index(mode), attempt)
 
 
 def pairs_rng(study: UserStudy, slot: int, condition: str) -> np.random.Generator:
     """Return what draws the order of a participant's comparisons after a condition: the same every time."""
     place = study.modes.index(condition) if condition else len(study.modes)
     return np.random.default_rng([study.seed, _PAIRS, slot, place])
-
-
-def _seed(*entropy: int) -> int:
-    return int(np.random.SeedSequence(entropy).generate_state(1)[0])

@@ -84,7 +84,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         check_known("camera", self.cameras, self.model.description.camera_names)
         self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
-        self._max_episode_steps = math.ceil(self.task.horizon * fps - 1e-6)
+        self._max_episode_steps = math.ceil(self.task.time_limit * fps - 1e-6)
         self._build, self._looks = plant, looks
         self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)

@@ -133,7 +133,7 @@ class Task(ABC):
     """A task: a frozen dataclass in its own file, with one entry in `collect/world/tasks/catalogue.py`."""
 
     description: str  # one sentence: what to do; LeRobot's `task` string
-    horizon: float  # time after which an episode is given up [s]
+    time_limit: float  # time after which an episode is given up [s]
     stages: ClassVar[tuple[str, ...]] = ()
     """Names of the stages in which it is done, one after the other, if it has any."""
 
@@ -169,7 +169,7 @@ class FixedTask(Task):
 
     begin: Start
     judge: Callable[[TaskState], Verdict]
-    horizon: float  # time limit [s]
+    time_limit: float  # [s]
     description: str = ""
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:

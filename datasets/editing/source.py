@@ -21,7 +21,7 @@ from handrail.datasets.recording.repair import tidy_locked
 from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import explained
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
             yield [EditSource.open(root, verify) for root in roots]
             return
         own = EditSource.open(target)
-        with DatasetLock(own.layout.staging):
+        with FolderLock(own.layout.staging):
             tidy_locked(own.layout, own.manifest, Checksums(target, anew=verify))
             if own.layout.damaged.exists():
                 raise HandrailError(

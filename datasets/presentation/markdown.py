@@ -52,7 +52,7 @@ def with_part(text: str, label: str, body: str) -> str:
     block = f"{begin}\n\n{body}\n\n{end}"
     name = re.escape(label)
     begins = list(re.finditer(f"<!-- {name} -->", text))
-    ends = list(re.finditer(f"<!-- end (?:of )?{name} -->", text))
+    ends = list(re.finditer(f"<!-- end of {name} -->", text))
     if not begins and not ends:
         return f"{text.rstrip()}\n\n{block}\n"
     if (len(begins), len(ends)) != (1, 1) or begins[0].end() > ends[0].start():

@@ -24,7 +24,7 @@ from handrail.datasets.recording.rewrite import settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.survey import Survey, shortened, survey
 from handrail.datasets.storage.atomic import explained, followed, remove, sync, write_whole
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 
 REWRITTEN = "whole, but as another tool wrote them"  # a repair renews their checksums
 REMOVED = "leftovers removed"  # of an interrupted recording
@@ -76,7 +76,7 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
         settle(layout.root)
         manifest = read_manifest(layout)
         check_folders(layout)
-        with DatasetLock(layout.staging):
+        with FolderLock(layout.staging):
             finish_clearing(layout)
             found = survey(layout, manifest, Checksums(layout.root, anew=True))
             done = _clear(found)

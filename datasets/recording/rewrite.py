@@ -20,7 +20,7 @@ from handrail.datasets.recording.file_group import write_file_groups
 from handrail.datasets.recording.folder import clear_staging, foreign_files, next_damaged
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, sync, write_whole
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 
 
 def write_anew(
@@ -85,7 +85,7 @@ def drafted(root: Path, replacing: bool = False) -> Iterator[Layout]:
         OSError: The disk does not take it, or somebody else has taken the name meanwhile.
     """
     draft = Layout(_draft(root))
-    with DatasetLock(draft.staging) as lock:
+    with FolderLock(draft.staging) as lock:
         try:
             for path in set(draft.root.iterdir()) - {draft.staging}:  # of a writing that was cut short
                 remove(path)
@@ -117,7 +117,7 @@ def settle(root: Path) -> bool:
     old, draft = beside(root, "old"), Layout(_draft(root))  # as `publish_folder` calls them
     finished, drafted = old.exists(), draft.root.exists()
     if finished or drafted:
-        with DatasetLock(draft.staging) as lock:
+        with FolderLock(draft.staging) as lock:
             if finished and not root.exists():
                 os.replace(draft.root if drafted else old, root)
                 lock.moved(Layout(root).staging)

@@ -49,7 +49,7 @@ from handrail.datasets.storage.atomic import (
     write_synced,
     write_whole,
 )
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 
 
 class EpisodeWriter:
@@ -64,7 +64,7 @@ class EpisodeWriter:
         layout: Layout,
         manifest: Manifest,
         totals: Totals,
-        lock: DatasetLock,
+        lock: FolderLock,
         types: ColumnTypes | None,
         repaired: RepairReport | None = None,
     ):
@@ -100,7 +100,7 @@ class EpisodeWriter:
         with explained(f"cannot create dataset {str(layout.root)!r}"), contextlib.ExitStack() as on_error:
             settle(layout.root)
             check_target(layout, overwrite)
-            lock = on_error.enter_context(DatasetLock(layout.staging))
+            lock = on_error.enter_context(FolderLock(layout.staging))
             check_target(layout, overwrite)  # again: another recorder may have been faster
             clear_dataset(layout)
             write_whole(layout.manifest, manifest.to_bytes(), layout.staging)
@@ -126,7 +126,7 @@ class EpisodeWriter:
             manifest.check()
             manifest.check_fits(existing, words)
             check_folders(layout)
-            lock = on_error.enter_context(DatasetLock(layout.staging))
+            lock = on_error.enter_context(FolderLock(layout.staging))
             report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
             types = read_column_types(row_files(layout)[-1]) if totals.episodes else None
             on_error.pop_all()

@@ -16,14 +16,14 @@ class HeldError(HandrailError):
     """Somebody else has the right to change it."""
 
 
-class DatasetLock:
-    """The right to change one dataset, held from construction to `release`."""
+class FolderLock:
+    """The right to change one folder, held from construction to `release`."""
 
     def __init__(self, staging: Path, thing: str = "dataset", holder: str = "recorder"):
         """Take the lock.
 
         Args:
-            staging: The dataset's staging folder; created if missing.
+            staging: The folder of the lock's file; created if missing.
             thing: The locked thing, in words.
             holder: The program that may hold it, in words.
 

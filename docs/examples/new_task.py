@@ -20,7 +20,7 @@ class TouchBall(Task):
     """Bring the tip of the hand within 5 cm of a ball that hangs in front of the robot."""
 
     description: str = "Touch the ball."
-    horizon: float = 20.0  # [s]
+    time_limit: float = 20.0  # [s]
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from handrail.controllers.errors import FAILED, check_known
 from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.config import TrainConfig, check_trainable
 from handrail.policies.imitation.training.presets import policy_config
 from handrail.policies.study.config import StudyConfig
@@ -50,7 +50,7 @@ def run_study(config: StudyConfig, work: Work = do, isolated: bool = True) -> in
     if config.page:
         with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
     with explained(f"--output {config.output}: expected a folder that can be written"):
-        lock = DatasetLock(config.folder / ".study", "study", "handrail-study")
+        lock = FolderLock(config.folder / ".study", "study", "handrail-study")
     with lock:
         done = config.report_only or _work(config, progress, console, work, isolated)
         from handrail.policies.study.report import write_study

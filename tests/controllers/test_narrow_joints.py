@@ -3,7 +3,7 @@
 import numpy as np
 from collect_helpers import episode
 
-from handrail.collect.commands.recording import episode_seed
+from handrail.collect.seeds import episode_seed
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.robot.model import load_model

@@ -23,7 +23,7 @@ class Press(Task):
     """Bring the tool within 4 cm of a button near it."""
 
     description: str = "Press the button."
-    horizon: float = 20.0
+    time_limit: float = 20.0
     state_names: tuple[str, ...] = ("button.x", "button.y", "button.z")
 
     def sample(self, model, rng):

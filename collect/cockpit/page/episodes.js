@@ -27,7 +27,7 @@ export class Episodes {
   }
 
   stage(stage) {
-    this.horizon = stage.horizon;
+    this.timeLimit = stage.time_limit;
     this.wanted = stage.wanted;
     set("task", stage.task);
     byId("task").title = stage.task;
@@ -73,9 +73,9 @@ export class Episodes {
 
   frame(frame) {
     if (frame.phase !== "ready") this.cancel();
-    const left = frame.phase === "ready" ? this.horizon : Math.max(0, frame.left);
-    set("clock", frame.phase === "ready" ? `${this.horizon} s` : `${left.toFixed(0)} s left`);
-    byId("bar").style.transform = `scaleX(${Math.min(1, 1 - left / this.horizon)})`;
+    const left = frame.phase === "ready" ? this.timeLimit : Math.max(0, frame.left);
+    set("clock", frame.phase === "ready" ? `${this.timeLimit} s` : `${left.toFixed(0)} s left`);
+    byId("bar").style.transform = `scaleX(${Math.min(1, 1 - left / this.timeLimit)})`;
     set("saved", `${frame.saved} saved${frame.saved ? `, ${frame.succeeded} succeeded` : ""}`);
     set("progress", this.wanted ? `${frame.saved} of ${this.wanted}` : "");
     byId("progress-bar").hidden = !this.wanted;

@@ -39,7 +39,7 @@ class CarryBox(Task):
     """
 
     description: str = "Carry the box to the other table with both hands."
-    horizon: float = 90.0  # time limit [s]
+    time_limit: float = 90.0  # [s]
 
     @property
     def state_names(self) -> tuple[str, ...]:

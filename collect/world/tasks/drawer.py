@@ -89,7 +89,7 @@ class Drawer(Task):
     """
 
     description: str = "Pull the drawer open by its handle."
-    horizon: float = 60.0  # time limit [s]
+    time_limit: float = 60.0  # [s]
 
     @property
     def state_names(self) -> tuple[str, ...]:

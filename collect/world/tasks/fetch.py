@@ -28,7 +28,7 @@ class Fetch(Drawer):
     """
 
     description: str = "Hold the drawer open with one hand and take the cube out with the other."
-    horizon: float = 90.0  # time limit [s]
+    time_limit: float = 90.0  # [s]
 
     @property
     def state_names(self) -> tuple[str, ...]:

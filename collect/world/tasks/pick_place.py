@@ -46,7 +46,7 @@ class PickPlace(Task):
     """
 
     description: str = "Pick up the cube and put it into the bin on the other table."
-    horizon: float = 90.0  # time limit [s]
+    time_limit: float = 90.0  # [s]
     length: float = 0.0
     """Of the cube along its y, where it is a bar; the bin is larger by half of that [m]."""
     stages = ("approach", "grasp", "lift", "carry", "place")

@@ -136,7 +136,7 @@ class Reach(Task):
     """
 
     description: str = "Move the gripper to the goal frame."
-    horizon: float = 30.0  # time limit [s]
+    time_limit: float = 30.0  # [s]
     moving_obstacles: int = 0
     """How many cylinders cross the robot's way; goals are the same with and without."""
     stages = ("approach", "turn")

@@ -29,7 +29,7 @@ class ReachBoth(Reach):
     """
 
     description: str = "Move each gripper to its own goal frame."
-    horizon: float = 60.0  # time limit [s]
+    time_limit: float = 60.0  # [s]
 
     @property
     def state_names(self) -> tuple[str, ...]:

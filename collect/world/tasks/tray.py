@@ -58,7 +58,7 @@ class Tray(Task):
     """
 
     description: str = "Carry the tray to the table and put it down without spilling the can."
-    horizon: float = 90.0  # time limit [s]
+    time_limit: float = 90.0  # [s]
     hands: int = 1  # that hold it
 
     @property

@@ -118,7 +118,7 @@ class _Watcher:
 
     def __init__(self, env: HandrailEnv, cameras: tuple[str, ...], rng: np.random.Generator) -> None:
         self._env, self._cameras, self._rng = env, cameras, rng
-        self._frames = env.task.horizon * env.fps
+        self._frames = env.task.time_limit * env.fps
         self._agent = AgentObservation(env.model)
         self.rows: list[Samples] = []
         self.been: list[FloatArray] = []

@@ -18,7 +18,7 @@ from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import beside
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.encoder.samples import DRIVEN, START, Drawn, Samples, batches
 from handrail.policies.imitation.interface.compute import device_of, threads
@@ -40,7 +40,7 @@ _LOOK = 0.3  # how much it counts where an eye looks
 def train(config: EncoderConfig) -> None:
     """Train an encoder, or go on with it, and print how far off it is."""
     config.check()
-    lock = DatasetLock(beside(config.file.resolve(), "lock"), "encoders in", "handrail-encoder")
+    lock = FolderLock(beside(config.file.resolve(), "lock"), "encoders in", "handrail-encoder")
     with lock, threads(config.threads), Interrupts() as interrupts, interrupts.deferred():
         training = _Training(config)
         console = Terminal(stderr=True)

@@ -19,7 +19,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import decoded
 from handrail.controllers.versions import TRAINING, versions
 from handrail.datasets.storage.atomic import beside, remove
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
     MIXED,
@@ -40,7 +40,7 @@ from handrail.policies.imitation.training.source import TrainingSource, read_sou
 _MAIN = os.environ.get("RANK", "0") == "0"  # the one of several processes that makes room and writes
 _LOG_EVERY = 50  # updates
 _WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
-_OURS = {CURVE, f".{CURVE}.partial", "training.json", "checkpoints"}  # training.json: of an earlier version
+_OURS = {CURVE, f".{CURVE}.partial", "checkpoints"}
 
 
 def train(config: TrainConfig) -> Path:
@@ -51,7 +51,7 @@ def train(config: TrainConfig) -> Path:
     """
     config.check()
     lock = beside(Path(os.path.realpath(config.folder)), "lock"), "trainings in", "handrail-train"
-    with in_one_line(config), DatasetLock(*lock) if _MAIN else nullcontext():
+    with in_one_line(config), FolderLock(*lock) if _MAIN else nullcontext():
         checkpoint = _begin(config)
         began = None if checkpoint is None else _checked(config, checkpoint)
         weights, known = checkpoint and checkpoint / MODEL, began
@@ -165,7 +165,7 @@ def _time_limit(recorded: Sequence[SessionConfig]) -> float:
     """Return the longest time that episodes were given [s]; 0 for the task's own, or if one does not say."""
     with suppress(HandrailError):
         if any(each.time_limit for each in recorded):
-            return float(max(build_task(each).horizon for each in recorded))
+            return float(max(build_task(each).time_limit for each in recorded))
     return 0.0
 
 

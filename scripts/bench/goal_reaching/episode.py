@@ -55,7 +55,7 @@ def run_episode(
     operator = _Planner(conditions, baseline, model)
     begin = Start(conditions.scene, model.description.home)
     judge = partial(_judged, given=conditions, planner=operator)
-    task = FixedTask(begin, judge, horizon=(T_MAX - 0.5) * STEP)
+    task = FixedTask(begin, judge, time_limit=(T_MAX - 0.5) * STEP)
     env = HandrailEnv(task, model, fps=1.0 / STEP, plant=plant(conditions.config.physics))
     observer = _Observer(baseline, controller, conditions.goal)
     outcome = Session(env, controller, operator, [observer], control_period=baseline.period).run(seed=0)

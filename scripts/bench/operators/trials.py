@@ -10,7 +10,6 @@ from typing import Annotated, Any, cast
 import numpy as np
 from msgspec import Meta
 
-from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.execution.execution import Execution
@@ -18,6 +17,7 @@ from handrail.collect.execution.job import Job
 from handrail.collect.flags import check_file, check_names, names
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripted.scripted import ScriptedOperator
+from handrail.collect.seeds import episode_seed
 from handrail.collect.session.build import build_controller, build_env, build_mode, build_operator
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv

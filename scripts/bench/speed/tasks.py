@@ -5,8 +5,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
+from handrail.collect.seeds import episode_seed
 from handrail.collect.session.build import build_controller, build_env, build_mode, build_operator
 from handrail.collect.session.session import Session
 from handrail.controllers.interface.command import Command

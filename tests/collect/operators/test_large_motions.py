@@ -5,10 +5,10 @@ import pytest
 from collect_helpers import episode
 from device_helpers import HOME, MODEL, PERFECT, drive, first_view
 
-from handrail.collect.commands.recording import episode_seed
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.placement import REACHED, arm_solutions, straight_solution
 from handrail.collect.operators.scripted.steering import Gains, MotionGoal, Target, hand_twist, pose_errors
+from handrail.collect.seeds import episode_seed
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose

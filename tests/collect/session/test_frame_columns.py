@@ -76,7 +76,7 @@ class Counted(HandrailEnv):
 
 def test_every_column_is_what_its_source_said(tmp_path):
     """Observed before the step, asked by the operator, commanded, sent within limits, or of the world."""
-    env = Counted(Reach(horizon=STEPS / FPS, moving_obstacles=1), MODEL, fps=FPS, plant=IdealRobot)
+    env = Counted(Reach(time_limit=STEPS / FPS, moving_obstacles=1), MODEL, fps=FPS, plant=IdealRobot)
     operator, controller = Counter(), Answer()
     with recording(tmp_path / "set", env) as recorder:
         outcome = Session(env, controller, operator, [recorder]).run(3)

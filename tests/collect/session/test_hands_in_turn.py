@@ -6,8 +6,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
+from handrail.collect.seeds import episode_seed
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.world.tasks.drawer import opened
 from handrail.controllers.errors import HandrailError

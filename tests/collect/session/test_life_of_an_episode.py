@@ -9,10 +9,10 @@ import pytest
 from collect_helpers import Watcher, recording
 
 from handrail.collect.commands.record import record
-from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import DatasetConfig, RecordConfig, SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.seeds import episode_seed
 from handrail.collect.session import build
 from handrail.collect.session.build import (
     build_controller,

@@ -78,7 +78,7 @@ def test_a_push_moves_the_robot_and_more_strength_moves_it_more():
 def test_the_mpc_holds_against_a_push_as_the_servos_alone_do():
     """A plan that went on from what is measured would give way, and then coast to rest."""
     controller, moved = MaskedMpc(MODEL), []
-    with environment("Reach", task=Reach(horizon=4.0)) as env:
+    with environment("Reach", task=Reach(time_limit=4.0)) as env:
         for seed in range(4):
             held, planned = (path(env, seed, (Pusher(1.0),), who)[:, :9] for who in (None, controller))
             moved.append([np.abs(way - way[0]).max() for way in (held, planned)])
@@ -88,7 +88,7 @@ def test_the_mpc_holds_against_a_push_as_the_servos_alone_do():
 
 
 def test_a_session_without_disturbance_is_what_it_was():
-    with environment("Reach", task=Reach(horizon=3.0)) as env:
+    with environment("Reach", task=Reach(time_limit=3.0)) as env:
         calm, again = path(env, 3), path(env, 3, (Pusher(0.0),))
         pushed, repeated = path(env, 3, (Pusher(1.0),)), path(env, 3, (Pusher(1.0),))
     assert np.abs(calm[:, :9] - calm[0, :9]).max() < 1e-3

@@ -70,7 +70,7 @@ def test_a_step_lasts_one_period(fps):
 
 
 def test_the_episode_is_truncated_at_the_horizon():
-    with environment("Reach", task=Reach(horizon=0.15)) as env:
+    with environment("Reach", task=Reach(time_limit=0.15)) as env:
         env.reset(seed=0)
         ends = [env.step(action(env))[2:] for _ in range(3)]
     assert [truncated for _, truncated, _ in ends] == [False, False, True]

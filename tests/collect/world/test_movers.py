@@ -92,7 +92,7 @@ def test_movers_start_clear_of_the_robot_and_cross_the_workspace():
 class Meeting(Reach):
     """Something comes straight at the robot; the goal is out of reach."""
 
-    horizon: float = 9.0
+    time_limit: float = 9.0
     moving_obstacles: int = 1
 
     def sample(self, model, rng):

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
+from handrail.collect.seeds import episode_seed
 from handrail.collect.session.build import build_env, build_session
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.inverse_kinematics import hands_configuration

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from collect_helpers import environment, episode, hold, moved
 
-from handrail.collect.commands.recording import episode_seed
+from handrail.collect.seeds import episode_seed
 from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.drawer import HANDLE, TRAVEL, Drawer, handle, inward, opened
 from handrail.collect.world.tasks.tray import Tray

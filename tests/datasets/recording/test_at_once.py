@@ -15,7 +15,7 @@ from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording import rewrite
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.recording.rewrite import settle
-from handrail.datasets.storage.lock import DatasetLock, HeldError
+from handrail.datasets.storage.lock import FolderLock, HeldError
 
 
 @pytest.fixture
@@ -74,12 +74,12 @@ def test_a_rewritten_dataset_is_held_by_one_alone(tmp_path, meanwhile):
 
 def test_a_lock_whose_folder_was_replaced_frees_nobody_elses(tmp_path):
     staging = tmp_path / "set" / ".handrail"
-    first = DatasetLock(staging)
+    first = FolderLock(staging)
     (tmp_path / "set").rename(tmp_path / "old")
-    with DatasetLock(staging):
+    with FolderLock(staging):
         first.release()
         with pytest.raises(HeldError):
-            DatasetLock(staging)
+            FolderLock(staging)
     assert not staging.exists()
 
 

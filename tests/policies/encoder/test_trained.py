@@ -15,7 +15,7 @@ from lerobot.policies.factory import make_pre_post_processors
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import open_dataset
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.encoder.samples import DRIVEN, OTHER, START, Drawn, batches
@@ -245,7 +245,7 @@ def test_a_draft_of_something_else_is_refused(tmp_path):
 def test_two_trainings_never_write_one_encoder(tmp_path):
     settings = config(tmp_path)
     with (
-        DatasetLock(tmp_path / ".e.safetensors.lock"),
+        FolderLock(tmp_path / ".e.safetensors.lock"),
         pytest.raises(HandrailError, match="by another handrail-encoder"),
     ):
         train(settings)

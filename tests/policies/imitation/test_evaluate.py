@@ -52,7 +52,7 @@ def untimed(content):
 
 
 def test_seeds_are_never_those_of_a_recording():
-    from handrail.collect.commands.recording import episode_seed
+    from handrail.collect.seeds import episode_seed
 
     recorded = [episode_seed(seed, episode) for seed in (0, 1, 10**6) for episode in range(200)]
     assert max(recorded) < FIRST_SEED

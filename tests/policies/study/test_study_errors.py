@@ -12,7 +12,7 @@ from study_helpers import DESIGN, Starter, run_here
 from toml_helpers import mutated
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.study import design as design_module
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import (
@@ -137,7 +137,7 @@ def test_a_folder_that_cannot_be_is_one_line(place, tmp_path, preset):
 
 
 def test_a_second_study_in_a_folder_is_told_what_the_first_is(tmp_path, preset):
-    lock = DatasetLock(tmp_path / "study" / ".study")
+    lock = FolderLock(tmp_path / "study" / ".study")
     try:
         with pytest.raises(HandrailError, match=r"study .* another handrail-study"):
             run_here(StudyConfig(preset, str(tmp_path / "study")), Starter())
