@@ -131,8 +131,8 @@ TABLES = {
     ("evaluation", "Protect and disturb"): lambda: {*PROTECTIONS, *DEFAULTS, "none"},
     ("comparison", "Quality metrics"): lambda: {metric.name for metric in METRICS},
     ("recording", "Flags of `handrail-record`"): lambda: flags(RecordConfig),
-    ("recording", "What is recorded"): columns,
-    ("takeover", "What is recorded, and how to train on it"): lambda: {c.name for c in SHARED_COLUMNS},
+    ("recording", "Recorded columns"): columns,
+    ("takeover", "Recorded columns, and training on them"): lambda: {c.name for c in SHARED_COLUMNS},
     ("recording", "Exit codes"): lambda: set(map(str, (0, cli.FAILED, cli.BAD_INPUT, cli.INTERRUPTED))),
     ("safety", "When the robot brakes"): lambda: {status.value for status in Status},
 }
