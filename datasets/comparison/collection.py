@@ -10,7 +10,7 @@ from handrail.datasets.comparison.groups import Group
 from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure, Value
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.proportions import paired_shares, unpaired_shares
-from handrail.datasets.statistics.resampling import FEWEST, bootstrap, permutation_p
+from handrail.datasets.statistics.resampling import FEWEST, NOTHING, bootstrap, permutation_p
 
 COLLECTING = "collecting"
 SUCCESS = Measure("success", "success while collecting", SHARE)
@@ -85,7 +85,8 @@ def matched_time(groups: Sequence[Group]) -> list[Group]:
 def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> Contrast:
     """Return how many times as many successes an hour there are.
 
-    Σ success / Σ time of one over that of the other, episodes resampled, as pairs where all began alike.
+    Σ success / Σ time of one over that of the other, episodes resampled, as pairs where all began alike. Else
+    p is of the difference in standard errors: permuted differences alone take the smaller group for another.
     """
     names = _names(HOURLY, group, baseline)
     pairs, counts = shared_seeds(group, baseline), (len(group.episodes), len(baseline.episodes))
@@ -104,8 +105,12 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> Contr
         one, other = rates(*chosen, axis=axis)
         return np.divide(one, one + other, out=np.full_like(one, 0.5), where=one + other > 0)
 
-    def difference(*chosen: IntArray, axis: int = -1) -> FloatArray:
-        return np.subtract(*rates(*chosen, axis=axis))
+    def apart(*chosen: IntArray, axis: int = -1) -> FloatArray:
+        one, other = rates(*chosen, axis=axis)
+        if pairs:
+            return one - other
+        square = sum(_square(successes[each], seconds[each], axis) for each in chosen)
+        return (one - other) / np.sqrt(np.maximum(square, NOTHING))
 
     low, high = bootstrap(places, share, bool(pairs), rng)  # of both, which is finite even without successes
     one, other = rates(*places)
@@ -114,7 +119,7 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> Contr
         null=1.0,
         estimate=float(one / other),
         interval=(low * _over(1.0 - low), high * _over(1.0 - high)),
-        p=permutation_p(places, difference, bool(pairs), rng),
+        p=permutation_p(places, apart, bool(pairs), rng),
         counts=counts,
         paired=bool(pairs),
     )
@@ -124,6 +129,13 @@ def _numbers(group: Group) -> tuple[FloatArray, FloatArray]:
     """Return success, NaN where it is not known, and duration [s] of every episode."""
     successes = [np.nan if e.success is None else float(e.success) for e in group.episodes]
     return np.array(successes), np.array([e.seconds for e in group.episodes])
+
+
+def _square(successes: FloatArray, seconds: FloatArray, axis: int) -> FloatArray:
+    """Return the squared standard error of a rate, `n / (n − 1) Σ (s_i − R t_i)² / (Σ t)²` [1/h²]."""
+    rate = np.expand_dims(_rate(successes, seconds, axis) / 3600.0, axis)
+    count, away = successes.shape[axis], successes - rate * seconds
+    return count / (count - 1) * (away**2).sum(axis=axis) * (3600.0 / seconds.sum(axis=axis)) ** 2
 
 
 def _over(ratio: float) -> float:

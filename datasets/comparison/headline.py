@@ -1,16 +1,16 @@
 """The answer of a comparison in a sentence or two, never more than the intervals; and what limits it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice
 
 from handrail.datasets.comparison.collection import SUCCESS
 from handrail.datasets.comparison.compare import Comparison
+from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.policies import Outcomes
 from handrail.datasets.comparison.report import sentence
 from handrail.datasets.presentation.wording import number, percent, percent_span
 from handrail.datasets.statistics.contrast import SHARE, Contrast, Value
 
-_MOST = 3  # differences that are named; the tables have all
+_MOST = 3  # differences that are named, detected ones first; the tables have all
 
 
 def headline(comparison: Comparison) -> str:
@@ -19,13 +19,14 @@ def headline(comparison: Comparison) -> str:
         differing = " and the ".join(comparison.unlike)
         return f"The {differing} differ: each group is described, none is ranked."
     outcomes = comparison.outcomes
-    told = _of_policies(outcomes) if outcomes else _of_collecting(comparison)
-    return " ".join(islice(dict.fromkeys(told), _MOST))
+    told = [*dict.fromkeys(_of_policies(outcomes) if outcomes else _of_collecting(comparison))]
+    more = [f"The tables have {len(told) - _MOST} more."] if len(told) > _MOST else []
+    return " ".join(told[:_MOST] + more)
 
 
 def _of_policies(outcomes: Outcomes) -> Iterator[str]:
     values = outcomes.successes
-    yield from _told(outcomes.differences, values)
+    yield from _told(_first(outcomes.differences), values)
     for each in values.values() if not outcomes.differences else ():
         told = f"{each.label} {percent(each.estimate)} (95 % {percent_span(each.widest)})"
         yield f"Success of policies: {told}, compared with no other."
@@ -34,10 +35,14 @@ def _of_policies(outcomes: Outcomes) -> Iterator[str]:
 def _of_collecting(comparison: Comparison) -> Iterator[str]:
     known = [each for each in comparison.collecting if not each.reason or each.measure is SUCCESS]
     values = {(each.label, each.measure): each for each in comparison.everything.collecting}
-    for label in comparison.others:
-        for each in (each for each in known if each.label == label):
-            sides = {side: values[side, each.measure] for side in (each.label, each.baseline)}
-            yield from _told([each], sides)
+    for each in _first([each for label in comparison.others for each in known if each.label == label]):
+        sides = {side: values[side, each.measure] for side in (each.label, each.baseline)}
+        yield from _told([each], sides)
+
+
+def _first(contrasts: Sequence[Contrast]) -> list[Contrast]:
+    """Return contrasts, those in which a difference was detected first."""
+    return sorted(contrasts, key=lambda each: not each.detected)
 
 
 def _told(contrasts: Sequence[Contrast], values: Mapping[str, Value]) -> Iterator[str]:
@@ -53,7 +58,9 @@ def cautions(comparison: Comparison) -> dict[str, bool]:
     moving = [each.name for each in comparison.everything.measurements.metrics if each.is_of_motion]
     rates, fewest = {group.info.fps for group in groups}, min(len(group.episodes) for group in groups)
     outcomes = comparison.outcomes
-    policies = [each.content for each in outcomes.conditions.values()] if outcomes else []
+    conditions = [*outcomes.conditions.values()] if outcomes else []
+    policies = [each.content for each in conditions]
+    rollouts = [{len(run.values) for run in each.runs()} for each in conditions]
     data = [each["trained_on"] for each in policies]
     amounts = [[each[name] for each in data if name in each] for name in ("episodes", "operator_time")]
     return {
@@ -62,10 +69,18 @@ def cautions(comparison: Comparison) -> dict[str, bool]:
         _ONE_DRAW: bool(policies) and all(each["draws"] == 1 for each in policies),
         _NO_PAIRS: any(not each.paired for each in outcomes.differences) if outcomes else False,
         _AMOUNTS: any(max(known) > 1.05 * min(known) for known in amounts if known),
+        _SEVERAL: any(_people(group) > 1 for group in groups)
+        and any(each.interval and not each.paired for each in differences),
+        _ROLLOUTS: any(len(each) > 1 for each in rollouts),
         _RATES: len(rates) > 1 and any(e.interval for e in differences if e.measure.name in moving),
         _UNITS: any(each.incomparable for each in differences),
         _FEW: fewest < 20,
     }
+
+
+def _people(group: Group) -> int:
+    """Return how many people, or scripted persons, steered a group's episodes, as far as they say."""
+    return len({(each.meta.get("participant"), each.meta.get("person")) for each in group.episodes})
 
 
 _NO_POLICIES = (
@@ -75,6 +90,13 @@ _NO_POLICIES = (
 _RATES = "Frame rates differ: smoothness and idle time are only roughly comparable."
 _UNITS = "Some metrics are not compared, because their units may differ: the report has a table of them."
 _FEW = "A group has fewer than 20 episodes: intervals of means are rough."
+_SEVERAL = (
+    "Several persons steered: their episodes are alike, and intervals take them for independent."
+    " `--study` pairs by participant."
+)
+_ROLLOUTS = (
+    "Policies of a condition have different numbers of rollouts; intervals of these policies pool them."
+)
 _FEW_SEEDS = "Fewer than 5 training seeds of a condition: the seed alone moves success by 10 to 15 points."
 _ONE_DRAW = "One draw of each dataset: how much another recording would differ is not in the intervals."
 _NO_PAIRS = "Training or evaluation seeds differ between conditions: rollouts were not compared as pairs."

@@ -91,7 +91,7 @@ def judge_pairs(
 
 
 def _values(condition: Condition, resampled: FloatArray, rng: np.random.Generator) -> Iterator[Value]:
-    """Yield success and the other outcomes.
+    """Yield success and the other outcomes: means over replicates, however many rollouts each has.
 
     `interval` of the success is Wilson's for these very policies, of as many rollouts as those in the same
     scenes are worth. `nested` is over dataset draw, training seed and evaluation seed: the wider of the
@@ -100,11 +100,12 @@ def _values(condition: Condition, resampled: FloatArray, rng: np.random.Generato
     for name in condition.outcomes:
         runs, success = condition.runs(name), name == SUCCESS
         values, means = np.concatenate([run.values for run in runs]), replicates(runs)
+        estimate = float(means.mean())
         nested = percentiles(resampled if success else resample_runs([runs], rng)[0])
         if len(means) > 1:
             error = standard_error([runs], chance_of_shares if success else chance_of_means)
             low = 0.0 if success or values.min() >= 0.0 else -np.inf
-            by_t = t_interval(float(means.mean()), *error)
+            by_t = t_interval(estimate, *error)
             nested = wider(nested, by_t, low, 1.0 if success else np.inf)
         worth = independent_trials(values, [seed for run in runs for seed in run.seeds]) if success else 0.0
         yield Value(
@@ -112,8 +113,8 @@ def _values(condition: Condition, resampled: FloatArray, rng: np.random.Generato
             label=condition.label,
             scope=POLICIES,
             values=np.array([run.values.mean() for run in runs]),
-            estimate=float(values.mean()),
-            interval=wilson(float(values.mean()) * worth, worth) if success else None,
+            estimate=estimate,
+            interval=wilson(estimate * worth, worth) if success else None,
             nested=None if success and len(means) < 2 else nested,
             counts=(len(values),),
         )
@@ -124,20 +125,21 @@ def _difference(
 ) -> Contrast:
     """Compare two conditions.
 
-    `interval` is over all rollouts, as if these policies were all there is; `nested` over dataset draw,
+    The difference is that of means over replicates. `interval` is over all rollouts, as if these policies
+    were all there is, each rollout counting alike; `nested` over dataset draw,
     training seed and evaluation seed, the wider of the nested bootstrap's and Welch's t interval over
     replicates. p is the largest of the exact test's, the nested bootstrap's, and Welch's: resampling a
     handful of training seeds alone would see too much. Where a condition has one replicate there is neither.
     """
     both = runs[pair.label], runs[pair.baseline]
     names = {"measure": POLICY_SUCCESS, "scope": POLICIES}
-    found = Contrast(**vars(pair), **names, **vars(compare_rollouts(*both)))
+    estimate = float(replicates(both[0]).mean() - replicates(both[1]).mean())
+    found = replace(Contrast(**vars(pair), **names, **vars(compare_rollouts(*both))), estimate=estimate)
     if min(len(replicates(each)) for each in both) < 2:
         return replace(found, p=None, errors=(), reason=_ALONE)
     nested = resampled[pair.label] - resampled[pair.baseline]
     tail = (1 + min(np.count_nonzero(nested <= 0), np.count_nonzero(nested >= 0))) / (len(nested) + 1)
     error, freedom = standard_error(both)
-    estimate = float(replicates(both[0]).mean() - replicates(both[1]).mean())
     return replace(
         found,
         nested=wider(percentiles(nested), t_interval(estimate, error, freedom), -1.0, 1.0),

@@ -79,7 +79,9 @@ def mutual_information(states: FloatArray, actions: FloatArray, rng: np.random.G
 
     Î = ψ(k) + ψ(N) − ⟨ψ(n_s + 1) + ψ(n_a + 1)⟩, the first estimator of Kraskov, Stögbauer & Grassberger
     2004, in random batches of about 1024 frames and averaged over k = 5, 6, 7. Its mean over an episode is
-    the score of Hejna et al. 2025, "Robot data curation with mutual information estimators" (DemInf). For
+    the score of Hejna et al. 2025, "Robot data curation with mutual information estimators" (DemInf). Frames
+    nearer than a thousandth of the scale are one: k is then their number (Gao et al. 2017), else a robot at
+    rest would tell most. For
     two normal numbers of correlation ρ it is −½ log(1 − ρ²); for independent ones 0.
 
     Args:
@@ -100,12 +102,13 @@ def _information_of(states: FloatArray, actions: FloatArray) -> FloatArray:
     apart, acted = cdist(states, states, "chebyshev"), cdist(actions, actions, "chebyshev")
     for distances in (apart, acted):
         np.fill_diagonal(distances, np.inf)
-    count, ks = len(states), [k - 1 for k in _KS]
-    radii = np.partition(np.maximum(apart, acted), ks, axis=1)[:, ks]
-    parts = [
-        digamma(k) + digamma(count) - digamma(_within(apart, radius)) - digamma(_within(acted, radius))
-        for k, radius in zip(_KS, radii.T, strict=True)
-    ]
+    count, ks, both = len(states), [k - 1 for k in _KS], np.maximum(apart, acted)
+    alike, parts = np.count_nonzero(both < RESOLUTION, axis=1), []
+    for k, radius in zip(_KS, np.partition(both, ks, axis=1)[:, ks].T, strict=True):
+        near = np.where(radius < RESOLUTION, alike, k)
+        wide = np.maximum(radius, RESOLUTION)
+        parts.append(digamma(near) + digamma(count))
+        parts[-1] -= digamma(_within(apart, wide)) + digamma(_within(acted, wide))
     return np.mean(parts, axis=0)
 
 

@@ -124,11 +124,11 @@ class Contrast(Value):
 
     @property
     def detected(self) -> bool:
-        """Whether every interval leaves no difference out and the adjusted p is below 0.05."""
+        """Whether every interval is on the same side of no difference and the adjusted p is below 0.05."""
         if self.p_adjusted is None or self.interval is None:
             return False
-        intervals = [self.interval, self.nested or self.interval]
-        return self.p_adjusted < LEVEL and not any(low <= self.null <= high for low, high in intervals)
+        (low, high), (lowest, highest) = self.interval, self.nested or self.interval
+        return self.p_adjusted < LEVEL and (min(low, lowest) > self.null or max(high, highest) < self.null)
 
     @property
     def at_equal_length(self) -> bool:

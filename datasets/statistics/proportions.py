@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.statistics.contrast import Estimate
+from handrail.datasets.statistics.contrast import Estimate, reach
 from handrail.datasets.statistics.paired import paired_success, wilson
 from handrail.datasets.statistics.resampling import Interval
 
@@ -58,12 +58,13 @@ def paired_shares(
     cells = [worth * count for count in (both, found.only_first, found.only_second, neither)]
     pairs = sum(cells)
     discordant = (cells[1] + cells[2] + 2.0) / (pairs + 4.0)
+    error = max(np.sqrt(discordant / pairs), reach() / pairs)  # a difference is so much discordance at least
     return Estimate(
         estimate=(found.only_first - found.only_second) / found.pairs,
         interval=newcombe_paired(*cells),
         p=mcnemar_by_scene(differences, scenes),
         counts=(found.pairs,),
-        errors=((float(np.sqrt(discordant / pairs)), np.inf),),
+        errors=((float(error), np.inf),),
         paired=True,
         largest=1.0,
     )
@@ -114,15 +115,26 @@ def unpaired_shares(
     table = [hits, [count - hit for count, hit in zip(trials, hits, strict=True)]]
     exact: Any = stats.boschloo_exact if trials[0] * trials[1] <= _MOST else stats.fisher_exact
     share = (one[0] + other[0] + 2) / (one[1] + other[1] + 4)
-    spread = np.sqrt(share * (1 - share) * (1 / worth[0] + 1 / worth[1]))
     return Estimate(
         estimate=shares[0] - shares[1],
         interval=newcombe((shares[0] * worth[0], worth[0]), (shares[1] * worth[1], worth[1])),
         p=float(exact(table).pvalue),
         counts=(one[1], other[1]),
-        errors=((float(spread), np.inf),),
+        errors=((_error_apart(share, worth), np.inf),),
         largest=1.0,
     )
+
+
+def _error_apart(share: float, trials: Sequence[float]) -> float:
+    """Return the standard error of a difference of shares where there is one that can be detected.
+
+    √(s (1 − s) / n₁ + s' (1 − s') / n₂), s' nearer to ½ by what is detected: near 0 and 1 that varies more.
+    """
+    moved = share
+    for _ in range(20):
+        error = np.sqrt(share * (1 - share) / min(trials) + moved * (1 - moved) / max(trials))
+        moved = share + np.clip(0.5 - share, -reach() * error, reach() * error)
+    return float(max(error, np.sqrt(share * (1 - share) * sum(1 / each for each in trials))))
 
 
 def newcombe_paired(both: float, only_first: float, only_second: float, neither: float) -> Interval:

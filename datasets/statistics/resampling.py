@@ -9,7 +9,7 @@ from handrail.controllers.arrays import FloatArray
 
 RESAMPLES = 4000
 FEWEST = 5  # values below which resampling says nothing
-_NOTHING = 1e-100  # a variance of values that are all the same
+NOTHING = 1e-100  # a variance of values that are all the same
 _AT_ONCE = 4_000_000  # resampled values in memory; that many in one go for up to a thousand
 
 Interval = tuple[float, float]
@@ -104,7 +104,7 @@ def p_of_means(
 
     def welch(one: FloatArray, other: FloatArray, axis: int) -> FloatArray:
         square = sum(each.var(axis=axis, ddof=1) / each.shape[axis] for each in (one, other))
-        return difference_of_means(one, other, axis) / np.sqrt(np.maximum(square, _NOTHING))
+        return difference_of_means(one, other, axis) / np.sqrt(np.maximum(square, NOTHING))
 
     return permutation_p(samples, difference_of_means if paired else welch, paired, rng, tests)
 

@@ -17,6 +17,10 @@ import numpy as np
 from scipy import stats
 
 TIMES = 2000
+ALONE = {  # each recording by itself: no common scale, or another controller's limits
+    *("action_variance", "information", "state_coverage", "saturation", "slack_used"),
+    *("input_effort", "input_reversals", "active_axes", "input_idle"),
+}
 
 
 def read(files):
@@ -53,7 +57,7 @@ def main(*files):
     """Print a line for each metric, the one that goes best with success first."""
     groups, rng = read(files), np.random.default_rng(0)
     every = [recorded for group in groups.values() for recorded, _ in group.values()]
-    names = sorted(set.intersection(*(set(draw) for recorded in every for draw in recorded)))
+    names = sorted(set.intersection(*(set(draw) for recorded in every for draw in recorded)) - ALONE)
     modes = sorted({mode for group in groups.values() for mode in group})
 
     def mean(measured, succeeded):

@@ -63,6 +63,10 @@ def main(archive, one, *others):
         for other in others:
             sides = found[task, one], found[task, other]
             draws = sorted(set(sides[0]) & set(sides[1]))
+            for mode, side in zip((one, other), sides, strict=True):
+                driven = [[amounts["minutes"] for amounts, *_ in side[draw]] for draw in draws]
+                if any(max(each) < 1.5 * min(each) for each in driven):
+                    sys.exit(f"{task}, {mode}: expected policies of several amounts of data, got one")
             if len(draws) < 2:
                 sys.exit(f"{task}: expected two draws or more of {one} and {other}, got {len(draws)}")
             for name in AMOUNTS:

@@ -9,6 +9,7 @@ import json
 import sys
 import tarfile
 from collections import defaultdict
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +53,7 @@ def main(figure, *archives):
     tasks, modes = (list(dict.fromkeys(key[k] for each in studies for key in each)) for k in (0, 1))
     drawn = Figure((5.2 * len(tasks), 4.2), layout="constrained")
     for axes, task in zip(np.atleast_1d(drawn.subplots(1, len(tasks), sharey=True)), tasks, strict=True):
-        for mark, study in zip(MARKS, studies, strict=False):
+        for mark, study in zip(cycle(MARKS), studies, strict=False):
             for mode in (mode for mode in modes if (task, mode) in study):
                 points = sorted((*point(rows), len(rows)) for rows in study[task, mode].values())
                 x, y, low, high, _ = np.transpose(points)

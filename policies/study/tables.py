@@ -133,16 +133,20 @@ def _collected(found: Sequence[dict[str, Any]]) -> tuple[str, ...]:
 
 
 def quality_table(task: str, results: Results) -> Table:
-    """Return the quality metrics of the demonstrations: the mean over draws of the mean over episodes."""
+    """Return the quality metrics of the demonstrations: the mean over draws of the mean over episodes.
+
+    Those that one scale, or one controller, would have to be shared for are left to `handrail-compare`.
+    """
     modes = [kind for kind in results.kinds if results.collected(task, kind)]
     found = [[each["quality"] for each in results.collected(task, mode)] for mode in modes]
-    rows, titles = [], {metric.name: metric.title for metric in METRICS}
-    for name in dict.fromkeys(name for draws in found for each in draws for name in each):
+    known = [metric for metric in METRICS if metric.needs not in ("scale", "controller")]
+    rows, titles = [], {metric.name: metric.title for metric in known}
+    for name in titles:
         values = [[each.get(name) for each in draws] for draws in found]
         means = [[value for value in each if value is not None] for each in values]
         if any(means):
             shown = (number(float(np.mean(each))) if each else DASH for each in means)
-            rows.append((titles.get(name, name), *shown))
+            rows.append((titles[name], *shown))
     return Table(("metric", *modes), rows, "The demonstrations: described, not tested")
 
 

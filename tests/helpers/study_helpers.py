@@ -39,7 +39,7 @@ COLLECTED = {
     "frames": 72,
     "reasons": {"timeout": 1},
     "digest": "d1ce",
-    "quality": {"length": 3.0, "sparc": -2.5, "interventions": 2.0, "contacts": 0.5},
+    "quality": {"length": 3.0, "sparc": -2.5, "interventions": 2.0, "contacts": 0.5, "saturation": 0.1},
 }
 LEARNT = {
     "steps": 10,

@@ -12,6 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT, MOST_BYTES, read_evaluations
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.statistics.paired import wilson
+from handrail.datasets.statistics.proportions import independent_trials
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import read_json
 from handrail.policies.imitation.evaluation.conditions import PolicyCondition
@@ -110,13 +111,14 @@ def evaluation_table(content: Mapping[str, Any]) -> Table:
 
 def _cells(entries: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     rows = [row for entry in entries for row in entry["rollouts"]]
-    successes = sum(row["success"] for row in rows)
-    low, high = wilson(successes, len(rows))
+    succeeded = np.array([float(row["success"]) for row in rows])
+    worth = independent_trials(succeeded, [row["seed"] for row in rows])
+    low, high = wilson(succeeded.mean() * worth, worth)
     times = [row["time_to_success"] for row in rows if "time_to_success" in row]
     reasons = Counter(row.get("failure_reason") or "unknown" for row in rows if not row["success"])
     return (
         str(len(set(map(_key, entries)))),
-        f"{successes}/{len(rows)} = {successes / len(rows):.0%}",
+        f"{succeeded.sum():.0f}/{len(rows)} = {succeeded.mean():.0%}",
         f"{low:.0%} – {high:.0%}",
         f"{np.median(times):.1f}" if times else "–",
         *(f"{100 * np.mean([row.get(name, 0) for row in rows]):.1f}" for name in ("contacts", "brakes")),

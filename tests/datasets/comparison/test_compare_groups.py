@@ -1,6 +1,7 @@
 """What `handrail-compare` compares: groups of episodes, matched in number and time, paired by their seeds."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from handrail.datasets.comparison.collection import (
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.groups import load_groups
+from handrail.datasets.comparison.headline import cautions
 from handrail.datasets.format.schema import Feature
 
 
@@ -88,3 +90,31 @@ def test_success_only(ours, tmp_path):
     view = comparison.everything
     assert [len(group.episodes) for group in view.groups] == [12, 6]
     assert [len(group.episodes) for group in view.collected] == [12, 12]
+
+
+def test_episodes_of_several_persons_are_said_to_be_alike(ours):
+    comparison = compare(CompareConfig(tuple(ours)))
+    groups = comparison.everything.groups
+    for ids, paired, said in (
+        ([None], False, False),
+        (["P1", "P2"], False, True),
+        (["P1", "P2"], True, False),
+    ):
+        steered = [
+            replace(
+                each,
+                episodes=tuple(
+                    replace(e, meta=e.meta | {"participant": ids[k % len(ids)]})
+                    for k, e in enumerate(each.episodes)
+                ),
+            )
+            for each in groups
+        ]
+        found = [replace(each, paired=paired) for each in comparison.everything.differences]
+        everything = {
+            "groups": steered,
+            "differences": found,
+            "measurements": comparison.everything.measurements,
+        }
+        told = cautions(SimpleNamespace(everything=SimpleNamespace(**everything), outcomes=None))
+        assert any("Several persons steered" in text for text, holds in told.items() if holds) == said

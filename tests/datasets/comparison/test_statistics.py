@@ -16,6 +16,7 @@ from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.proportions import (
     newcombe,
     newcombe_paired,
+    paired_shares,
     unpaired_shares,
 )
 from handrail.datasets.statistics.resampling import (
@@ -258,3 +259,18 @@ def test_thousands_of_trials_are_compared_by_a_test_that_takes_no_minutes(monkey
     many = unpaired_shares([True] * 900 + [False] * 1100, [True] * 1000 + [False] * 1000)
     exact: Any = fisher_exact([[900, 1000], [1100, 1000]])
     assert many.p == pytest.approx(exact.pvalue)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.96])
+@pytest.mark.parametrize("paired", [True, False])
+def test_the_detectable_difference_is_detected_where_nearly_all_succeed(share, paired):
+    """80 % of experiments are claimed; where both always succeeded, 17 % of 3.9 points would be seen."""
+    compare, count, generator = (paired_shares if paired else unpaired_shares), 100, rng(5)
+    always = np.arange(count) < share * count
+    apart = compare(always, always).detectable()
+    seen = 0
+    for _ in range(100):
+        one = generator.random(count) < share
+        other = one & (generator.random(count) > apart / share)
+        seen += compare(one, other if paired else generator.permutation(other)).p < 0.05
+    assert 70 <= seen <= 100

@@ -252,3 +252,17 @@ def test_one_command_at_a_time_writes_a_file(folder, tmp_path):
     assert len(rollouts(evaluate(asked, load=another), "ee intent")) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["e.json"]
     assert len(rollouts(evaluate(replace(asked, episodes=2), load=load), "ee intent")) == 2
+
+
+def test_the_same_scenes_under_more_policies_are_no_more_scenes():
+    """Three policies that do the same in 100 scenes: the interval of one."""
+    rollouts = [{"seed": seed, "success": seed % 3 > 0, "length": 1.0} for seed in range(100)]
+    tables = [
+        evaluation_table(
+            {"arms": {"ee": [{"training_seed": k, "rollouts": rollouts} for k in range(policies)]}}
+        )
+        for policies in (1, 3)
+    ]
+    (one,), (three,) = (table.rows for table in tables)
+    assert (one[2], three[2]) == ("66/100 = 66%", "198/300 = 66%")
+    assert one[3] == three[3] == "56% – 75%"

@@ -59,7 +59,9 @@ def test_the_metric_that_goes_with_success_is_named_first(tmp_path, amounts):
     rng, draws = np.random.default_rng(0), range(3)
     shares = {(mode, draw): rng.random() for mode in "abcd" for draw in draws}
     jobs = {
-        f"collect/reach/{mode}/{draw}": {"result": {"quality": {"telling": -share, "other": rng.random()}}}
+        f"collect/reach/{mode}/{draw}": {
+            "result": {"quality": {"telling": -share, "other": rng.random(), "saturation": share}}
+        }
         for (mode, draw), share in shares.items()
     }
     conditions = [
@@ -156,6 +158,10 @@ def test_a_contact_after_the_hand_got_nearer_no_more_is_told_apart(tmp_path):
     [
         (("contacts.py", RESULTS / "teleop_modes_factors.tar.xz"), "expected rollouts that say `distances`"),
         (("success.py", *[RESULTS / "teleop_modes_factors.tar.xz"] * 2), "expected FIGURE.png"),
+        (
+            ("minutes.py", RESULTS / "teleop_modes_answer.tar.xz", "ee", "direct"),
+            "pick_place, ee: expected policies of several amounts of data, got one",
+        ),
     ],
 )
 def test_settings_that_a_script_cannot_use_are_one_line(script, told):

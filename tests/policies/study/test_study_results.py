@@ -255,3 +255,9 @@ def test_figures_show_what_was_found_and_no_text_covers_another(gathered):
     assert not shows(made["answer"], 12.345)
     for figure in made.values():
         check_texts(figure)
+
+
+def test_metrics_without_a_common_scale_are_left_to_compare(gathered):
+    """Each recording is measured by itself: a share of its own largest command says nothing of others."""
+    rows = tables.quality_table("reach", gathered()).rows
+    assert [row[0] for row in rows] == ["episode length", "smoothness (SPARC)", "contacts", "interventions"]
