@@ -129,6 +129,7 @@ class Link:
         """Send the robot a period of the full stop, if the command after the last one is late."""
         with self._lock:
             if self._clock() - self._sent_at > _LATE * self.period and self.body.velocity.any():
+                self.body.pass_time(self._clock())
                 self._send(())
                 self.late += 1
 

@@ -17,6 +17,8 @@ from handrail.controllers.robot.model import RobotModel
 
 _LEAD = 0.2  # how far a joint's target may be ahead of where the joint is [rad, m]
 _HOLD = 0.5  # for how long a base may go on as it was sent: LeKiwi's watchdog [s]
+_SILENT = 2.5  # periods without an observation, after which velocities say nothing of the way
+_PUSHED = 4.0  # a base goes no faster, as a share of its limit: people push robots
 _STROKES = 1.5  # of a gripper whose speed nobody knows [1/s]
 
 
@@ -41,9 +43,10 @@ class WholeBody:
     farther ahead of the joint than 0.2 rad; where it would, the whole arm slows down and stays on its path.
     Whatever is measured, a target moves no faster than its joint may: `|r⁺ − r| ≤ h v_max`.
 
-    A robot without odometry is where its base's velocities have led. An observation that makes no sense, or
-    the very same object again, is none: the base goes on as it was sent, until the next one. So is one in
-    which a joint is where it cannot have come: `|q⁺ − q| > v_max Δt + 0.2`.
+    A robot without odometry is where its base's velocities have led; where it was not heard for more than
+    2.5 periods, where what it was sent has led. An observation that makes no sense, or the very same object
+    again, is none: the base goes on as it was sent, until the next one. So is one in which a joint is where
+    it cannot have come, `|q⁺ − q| > v_max Δt + 0.2`, or the base faster than four times its limit.
 
     Args:
         model: of the robot.
@@ -107,6 +110,8 @@ class WholeBody:
             now: on any clock that advances [s].
         """
         reading = self._units.read(observation)
+        if now < self._time:  # the clock was put back; what was heard is as old as before
+            self._heard -= self._time - now
         if reading and self._leaps(reading, now):
             reading = None
         self._go_on(now)
@@ -120,12 +125,16 @@ class WholeBody:
             )
         stale = "stale_observation" if now - self._heard > self._timeout else ""
         self.trouble = stale if reading else "malformed_observation"
-        if math.isfinite(now):
-            self._time = now
+        self._time = now if math.isfinite(now) else self._time
         v = np.where(self._held, 0.0, self.velocity)
         self.targets = np.where(self._units.sends_position, self.targets, self._reading.arm)
         expected = np.append(self._expected()[: self._b], self.targets)
         return State(np.append(self._now(), self._reading.arm), v, now, self.velocity, expected)
+
+    def pass_time(self, now: float) -> None:
+        """Take note that it goes on as it was sent until now [s], before something else is sent."""
+        self._go_on(now)
+        self._time = now if math.isfinite(now) else self._time
 
     def send(self, command: ArrayLike) -> dict[str, float]:
         """Return the robot's action for a command, inside the limits.
@@ -153,25 +162,36 @@ class WholeBody:
         return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grips)
 
     def _leaps(self, reading: BodyReading, now: float) -> bool:
-        """Return whether a joint is where it cannot have come since the last observation that made sense."""
-        way = self._fastest * max(now - self._heard, 0.0) + _LEAD
-        return self._reading is not None and bool((np.abs(reading.arm - self._reading.arm) > way).any())
+        """Return whether a joint is where it cannot have come since it was heard, or the base is too fast."""
+        fastest, way = (
+            self._model.description.limits.velocity[:3],
+            self._fastest * max(now - self._heard, 0.0),
+        )
+        if self._b and bool((np.abs(reading.twist) > _PUSHED * fastest).any()):
+            return True
+        return self._reading is not None and bool(
+            (np.abs(reading.arm - self._reading.arm) > way + _LEAD).any()
+        )
 
     def _go_on(self, now: float) -> None:
         """Take note of how far the base was sent, which it says later: `sent - said`, 0 after a rest."""
         passed = _passed(self._time, now, _HOLD)
-        self._rested = 0.0 if self._twist.any() else self._rested + passed
+        silent = now - self._heard > _SILENT * self._period
+        self._rested = 0.0 if self._twist.any() or silent else self._rested + passed
         going = moved(self._expected(), self._twist, passed) - self._base
-        most = _HOLD * self._model.description.limits.velocity[:3]
+        most = 2.0 * _HOLD * self._model.description.limits.velocity[:3]
         self._under_way = np.zeros(3) if self._rested > _HOLD else np.clip(going, -most, most)
 
     def _take(self, reading: BodyReading, now: float) -> None:
         """Take an observation that makes sense."""
         before, base = self._reading, self._base
+        silent = before is not None and now - self._heard > _SILENT * self._period
         if before is None:
             self.targets = reading.arm.copy()
             self._grips = 1.0 - reading.openings
             self._gate.grippers = tuple(self._grips.tolist())
+        elif reading.pose is None and silent:  # two velocities say nothing of the way between
+            self._base, base, self._under_way = self._expected(), self._expected(), np.zeros(3)
         elif reading.pose is None:
             passed = _passed(self._heard, now, self._timeout)
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)

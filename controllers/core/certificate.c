@@ -34,10 +34,10 @@ static void check_pair(Scene *s, int64_t pair, double time) {
   find(s, time, s->slack[pair] == MOVING ? 0.0 : hard, SMALLER(least, now - ERROR) - distance);
 }
 
-static void check_joints(Scene *s, const double *q, double time) {
+static void check_joints(Scene *s, const double *begin, const double *q, double time) {
   for (int64_t j = 0; j < s->n; j++) {
     double room = SMALLER(q[j] - s->lower[j], s->upper[j] - q[j]) + BEYOND;
-    double before = SMALLER(0.0, SMALLER(s->start[j] - s->lower[j], s->upper[j] - s->start[j]));
+    double before = SMALLER(0.0, SMALLER(begin[j] - s->lower[j], s->upper[j] - begin[j]));
     if (!(room >= 0.0)) find(s, time, before - room, 0.0);
   }
 }
@@ -60,7 +60,7 @@ static int64_t close_pairs(Scene *s, const double *way, double time) {
 }
 
 /* Go through a stretch; distances of close pairs, or lower bounds of them, stand in here. */
-static void pass(Scene *s, int64_t count, const Stretch *part) {
+static void pass(Scene *s, int64_t count, const double *begin, const Stretch *part) {
   double *rate = s->bound, q[MOST_COORDINATES], witness[9], passed = 0.0;
   for (int64_t i = 0; i < count; i++) {
     int64_t p = s->close[i];
@@ -92,7 +92,7 @@ static void pass(Scene *s, int64_t count, const Stretch *part) {
     }
   }
   position(s, part, part->length, q);
-  check_joints(s, q, part->time + part->length);
+  check_joints(s, begin, q, part->time + part->length);
 }
 
 /* Begin the stretch from a knot to the next; the first begins where the robot is now. */
@@ -116,7 +116,7 @@ static void end_stretch(const Scene *s, Stretch *part) {
    same motion from start + lag, too. */
 void motion_violation(Scene *s, int64_t count, const double *velocities, double dt, double elapsed, double span,
                       const double *lag) {
-  double way[MOST_COORDINATES] = {0}, time = 0.0;
+  double way[MOST_COORDINATES] = {0}, begin[MOST_COORDINATES], time = 0.0;
   int64_t n = s->n;
   int moving = 0;
   Stretch part;
@@ -135,15 +135,16 @@ void motion_violation(Scene *s, int64_t count, const double *velocities, double 
       part.q[j] += lag[j];
       add(s->here, -fabs(lag[j]), s->bounds + j * s->P, s->P);
     }
+    memcpy(begin, part.q, n * sizeof(double));
     part.time = 0.0;
     int64_t close = close_pairs(s, way, time + wait);
     for (int64_t k = 0; k + 1 < count; k++) {
       begin_stretch(s, velocities + k * n, dt, elapsed, k == 0, &part);
-      pass(s, close, &part);
+      pass(s, close, begin, &part);
       end_stretch(s, &part);
     }
     memset(part.before, 0, sizeof part.before), memset(part.after, 0, sizeof part.after);
     part.length = wait;
-    if (wait > 0.0) pass(s, close, &part);
+    if (wait > 0.0) pass(s, close, begin, &part);
   }
 }

@@ -31,7 +31,7 @@ class Limiter:
     ) -> tuple[FloatArray, bool]:
         """Return the velocity that may be commanded, (n,), and whether it differs from the target.
 
-        A target of the wrong size, or with a number that is not finite, brakes.
+        A target of the wrong size, or a target or a position with a number that is not finite, brakes.
 
         Args:
             previous: the velocity commanded last, (n,) [m/s, rad/s].
@@ -40,11 +40,12 @@ class Limiter:
             q: the position, (n,) [m, rad]; None leaves position limits alone.
         """
         target = np.asarray(target, dtype=np.float64)
-        valid = target.shape == previous.shape and bool(np.all(np.isfinite(target)))
+        known = q is None or bool(np.all(np.isfinite(q)))
+        valid = known and target.shape == previous.shape and bool(np.all(np.isfinite(target)))
         wanted = target if valid else np.zeros_like(previous)
         maximum = self.limits.velocity
         allowed = _within(wanted, -maximum, maximum)
-        if q is not None:
+        if q is not None and known:
             allowed = _within(allowed, *self._braking_range(q))
         step = self.limits.acceleration * duration
         allowed = _within(allowed, previous - step, previous + step)

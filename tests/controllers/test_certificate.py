@@ -6,7 +6,12 @@ from ideal_robot import HOME, MODEL, REST
 
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.trajectory import Trajectory
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.safety.backup import full_stop
 from handrail.controllers.safety.certificate import Certificate
@@ -67,3 +72,23 @@ def test_nothing_thin_stands_between_the_samples_of_a_motion(stages, dt):
         assert violation.all <= 0.0 or violation.time <= motion.path(HOME)[1][-1] or velocity.any()
         found += violation.all > 0.0
     assert found > 20
+
+
+def test_a_joint_that_sags_past_its_end_does_not_hold_the_others():
+    """Its target is inside, where it is measured is not: no farther than now is no farther than there."""
+    model = load_model("lekiwi")
+    mpc, limits, period = MaskedMpc(model), model.description.limits, 0.05
+    mpc.reset()
+    expected = np.array(model.description.home)
+    expected[7] = limits.position_upper[7] - 0.005
+    q, v = expected.copy(), np.zeros(model.size)
+    q[7] = limits.position_upper[7] + 0.03
+    mask = mpc.channels.mask("joint")
+    values = np.where(np.arange(len(mask)) == mpc.channels.joint_slice.start + 3, 0.5, 0.0)
+    for step in range(1, 31):
+        state = State(q, v, step * period, v, expected)
+        command = mpc.update(state, Intent(values, mask, time=step * period))
+        assert command.diagnostics.status is not Status.BACKUP
+        way = 0.5 * period * (v + command.velocity(period))
+        q, expected, v = q + way, expected + way, command.velocity(period)
+    assert expected[3] - model.description.home[3] > 0.5

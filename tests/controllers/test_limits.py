@@ -68,3 +68,12 @@ def test_braking_is_the_fastest_stop(velocity):
     slower = np.maximum(np.abs(velocity) - LIMITS.acceleration * times, 0.0)
     np.testing.assert_allclose(braking, np.sign(velocity) * slower, atol=1e-9)
     np.testing.assert_allclose(braking[-1], 0.0)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_position_that_is_no_number_brakes(wrong):
+    """And the velocity stays a number: the next command begins from it."""
+    previous, step = 0.5 * LIMITER.limits.velocity, LIMITER.limits.acceleration * 0.05
+    velocity, clipped = LIMITER.limit(previous, previous, 0.05, np.full(len(previous), wrong))
+    assert clipped
+    np.testing.assert_allclose(velocity, np.maximum(previous - step, 0.0))

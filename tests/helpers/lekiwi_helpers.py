@@ -16,6 +16,7 @@ from handrail.collect.processor.units import robot_units
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.pick_place import PickPlace
 from handrail.collect.world.tasks.reach import Reach
+from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
 
@@ -83,6 +84,7 @@ class FarClient:
         self.link: Link | None = None
         self._commands: list[bytes] = []
         self._said: dict[str, Any] = {}
+        self.deaf, self._heard = False, self._said
         self._turn = self.clock.now
         self.sleep(2.0 * latency + 0.1)
 
@@ -111,7 +113,8 @@ class FarClient:
         self._commands.append(json.dumps(action).encode())
 
     def get_observation(self) -> dict[str, Any]:
-        return self._said
+        self._heard = self._heard if self.deaf else self._said
+        return self._heard
 
 
 def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: float) -> tuple[int, float]:
@@ -144,3 +147,46 @@ def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: floa
         env.plant.send(np.append(command.velocity(0.05), 0.0))
     link.close()
     return client.body.contacts - before, way
+
+
+def interrupted_drive(cut: str, seconds: float, seed: int) -> tuple[list[float], int]:
+    """Drive a LeKiwi's base at furniture, cut off six times; return how far ahead it is thought and contacts.
+
+    Args:
+        cut: deaf, the robot is not heard, or halted, the loop stands.
+        seconds: how long each time.
+        seed: of the scene.
+    """
+    client, model = FarClient(0.0, 0.0, seed), load_model("lekiwi")
+    link = client.link = Link(client, "lekiwi", model, 0.05, True, client.clock, client.sleep)
+
+    def plant(robot, scene, q, period, **looks):
+        return ClientPlant(robot, scene, q, link, seed)
+
+    env = HandrailEnv(PickPlace(), "lekiwi", fps=20, real=True, plant=plant)
+    env.reset(seed=seed)
+    mpc = MaskedMpc(model)
+    mpc.reset(env.plant.obstacles())
+    mask = mpc.channels.mask("base")
+
+    def drive(time: float, speed: float) -> None:
+        for _ in range(round(time / 0.05)):
+            state = env.state()
+            command = mpc.update(
+                state, Intent(np.where(np.arange(len(mask)) == 0, speed, 0.0), mask, time=state.time)
+            )
+            env.plant.send(np.append(command.velocity(0.05), 0.0))
+
+    drive(3.3, -0.12)
+    drive(0.6, 0.0)
+    before, ahead = client.body.contacts, []
+    for _ in range(6):
+        drive(1.0, 0.12)
+        client.deaf = cut == "deaf"
+        drive(seconds, 0.12) if client.deaf else client.sleep(seconds)
+        client.deaf = False
+        drive(0.1, 0.12)
+        ahead.append(float(env.state().q[0] - client.body.base[0]))
+    drive(2.0, 0.12)
+    link.close()
+    return ahead, client.body.contacts - before

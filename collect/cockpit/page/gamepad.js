@@ -89,6 +89,12 @@ export class Gamepad {
 
   choose(pad) {
     const { before } = this.capture, { pressed, axes } = this.capture.before = pushed(pad);
+    const stop = this.inputs.mapping.buttons.stop;
+    if (pressed[stop] && !before.pressed[stop]) { // whatever is asked, this is the stop
+      this.capture = this.was = null;
+      this.act("stop");
+      return [];
+    }
     const button = pressed.findIndex((now, index) => now && !before.pressed[index]);
     const axis = axes.findIndex((now, index) => now && !before.axes[index]);
     const { kind, taken } = this.capture;

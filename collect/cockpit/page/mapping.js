@@ -25,6 +25,11 @@ const isIndex = (value) => Number.isInteger(value) && value >= -1 && value < 64;
 const sameNames = (value, wanted) => value !== null && typeof value === "object" && Object.keys(wanted).every((name) => name in value)
   && Object.keys(value).length === Object.keys(wanted).length;
 
+// An older page ended the recording with that key.
+function renewed(kept, first) {
+  return kept.actions?.quit === BACK ? { ...kept, actions: { ...kept.actions, quit: first.actions.quit } } : kept;
+}
+
 // What was kept fits this robot and this page, piece by piece.
 function isFine(kept, first) {
   const keys = Array.isArray(kept.keys) && kept.keys.length === first.keys.length
@@ -41,7 +46,7 @@ export class Mapping {
     this.name = `map:${stage.robot}`;
     Object.assign(this, { offered: actionsOf(stage), held: heldOf(stage) });
     this.first = defaults(stage);
-    Object.assign(this, recall(this.name, (kept) => isFine(kept, this.first), this.first));
+    Object.assign(this, renewed(recall(this.name, (kept) => isFine(renewed(kept, this.first), this.first), this.first), this.first));
   }
 
   // The action of a key, or undefined.

@@ -53,6 +53,7 @@ export class Sliders {
     track.addEventListener("keydown", (event) => {
       if (!(event.code in ARROWS) || track.getAttribute("aria-disabled") === "true") return;
       event.preventDefault();
+      if (event.repeat && !this.held.has(index)) return; // held since before: it has to go up first
       this.hold(index);
       this.put(index, this.targets[index] + STEP * ARROWS[event.code]);
     });

@@ -84,6 +84,18 @@ def test_a_gamepad_is_changed_on_the_card_and_that_is_remembered(on_bench):
     expect(driver.at("pad")).to_contain_text("hold L1 to move")
 
 
+def test_a_gamepad_stops_while_the_card_waits_for_a_button(on_bench):
+    _, driver = on_bench(script=Pad.SCRIPT)
+    page = driver.page
+    driver.press("KeyH")
+    page.get_by_role("button", name="hold to move: L1").click()
+    pad(page, 1, True)
+    driver.expect_phase("STOPPED")
+    pad(page, 1, False)
+    expect(page.get_by_role("button", name="hold to move: L1")).to_be_visible()  # and B is still the stop
+    expect(page.get_by_role("button", name="stop: B")).to_be_visible()
+
+
 def test_keys_are_changed_on_the_card_but_never_the_stop(on_bench):
     _, driver = on_bench()
     page = driver.page
@@ -123,6 +135,24 @@ def test_sliders_take_the_arm_from_where_it_is(on_bench):
         shoot(page, "sliders")
         page.mouse.up()
         made.wait(lambda intent: not intent.values.any())
+
+
+def test_an_arrow_held_since_before_moves_no_slider(on_bench):
+    made, driver = on_bench("direct", viewport={"width": 1280, "height": 720})
+    driver.begin()
+    track = driver.page.locator("#sliders .track").nth(1)
+    track.focus()
+    driver.page.keyboard.down("ArrowRight")
+    made.wait(lambda intent: intent.values.any())
+    track.blur()
+    made.wait(lambda intent: not intent.values.any())
+    track.focus()
+    for _ in range(5):
+        driver.page.keyboard.down("ArrowRight")  # the same key, still down: a repeat
+        assert not made.wait(lambda intent: True).values.any()
+    driver.page.keyboard.up("ArrowRight")
+    driver.page.keyboard.down("ArrowRight")
+    made.wait(lambda intent: intent.values.any())
 
 
 def test_any_mask_is_chosen_and_a_mode_goes_back(on_bench):

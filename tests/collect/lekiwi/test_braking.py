@@ -63,6 +63,27 @@ def test_no_reading_moves_a_target_faster_than_its_joint_may(glitch, pushed):
     assert abs(glitch) > 3.0 or abs(now[2] - arm[2] - glitch) <= 0.2 + 1e-9
 
 
+def test_a_velocity_that_no_base_has_is_no_observation():
+    """One such number would put the base elsewhere for good."""
+    body, arm = WholeBody(MODEL, UNITS, PERIOD), HOME[BASE:]
+    for period in range(20):
+        fast = -5.0 if period == 10 else 0.0
+        state = body.observe(
+            UNITS.action(arm, np.zeros(5), np.array([fast, 0.0, 0.0]), (0.0,)), period * PERIOD
+        )
+        assert bool(body.trouble) == bool(fast)
+        assert np.abs(state.q[:3]).max() < 1e-9
+
+
+def test_a_clock_that_goes_back_makes_nothing_fresh():
+    """The very same observation again, while the clock jumps: stale after its time all the same."""
+    body, said = WholeBody(MODEL, UNITS, PERIOD), UNITS.action(HOME[BASE:], np.zeros(5), np.zeros(3), (0.0,))
+    times = [0.0, PERIOD, *(2 * PERIOD - 100.0 + PERIOD * k for k in range(20))]
+    for time in times:
+        body.observe(said, time)
+    assert body.trouble == "stale_observation"
+
+
 def test_a_zero_for_every_key_is_no_observation():
     body = WholeBody(MODEL, UNITS, PERIOD)
     body.observe(dict(GOOD), 0.0)

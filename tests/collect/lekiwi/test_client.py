@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_helpers import command, refused
-from lekiwi_helpers import ZERO, FarClient, PlayedClient, rude_drive
+from lekiwi_helpers import ZERO, FarClient, PlayedClient, interrupted_drive, rude_drive
 
 from handrail.collect.client_config import ClientConfig
 from handrail.collect.commands.replay import replay_episode
@@ -211,3 +211,11 @@ def test_a_dataset_that_cannot_say_what_was_driven_is_refused_before_the_robot_m
     assert "its episodes have no 'robot_client'" in done.stderr
     assert all(set(sent.values()) <= {0.0} for sent in client.sent)
     assert len(read_episodes(tmp_path / "set")) == 1
+
+
+@pytest.mark.parametrize(("cut", "seconds", "ahead"), [("deaf", 0.6, 0.01), ("halted", 0.4, 0.03)])
+def test_a_gap_in_hearing_a_robot_loses_none_of_its_way(cut, seconds, ahead):
+    """It drives on, or is braked, while nobody hears it: expected is where that has led, or farther."""
+    off, contacts = interrupted_drive(cut, seconds, seed=0)
+    assert -0.005 < min(off) <= max(off) < ahead
+    assert contacts == 0
