@@ -90,10 +90,7 @@ _NO_POLICIES = (
 _RATES = "Frame rates differ: smoothness and idle time are only roughly comparable."
 _UNITS = "Some metrics are not compared, because their units may differ: the report has a table of them."
 _FEW = "A group has fewer than 20 episodes: intervals of means are rough."
-_SEVERAL = (
-    "Several persons steered: their episodes are alike, and intervals take them for independent."
-    " `--study` pairs by participant."
-)
+_SEVERAL = "Several persons steered: their own episodes are alike, but intervals take them for independent."
 _ROLLOUTS = (
     "Policies of a condition have different numbers of rollouts; intervals of these policies pool them."
 )

@@ -105,8 +105,7 @@ def _information_of(states: FloatArray, actions: FloatArray) -> FloatArray:
     count, ks, both = len(states), [k - 1 for k in _KS], np.maximum(apart, acted)
     alike, parts = np.count_nonzero(both < RESOLUTION, axis=1), []
     for k, radius in zip(_KS, np.partition(both, ks, axis=1)[:, ks].T, strict=True):
-        near = np.where(radius < RESOLUTION, alike, k)
-        wide = np.maximum(radius, RESOLUTION)
+        near, wide = np.where(radius < RESOLUTION, alike, k), np.maximum(radius, RESOLUTION)
         parts.append(digamma(near) + digamma(count))
         parts[-1] -= digamma(_within(apart, wide)) + digamma(_within(acted, wide))
     return np.mean(parts, axis=0)

@@ -145,13 +145,11 @@ def test_mutual_information_of_two_normal_numbers(rho):
     assert parts.mean() == pytest.approx(-0.5 * np.log(1 - rho**2), abs=0.06)
 
 
-@pytest.mark.parametrize("rest", [0.2, 0.4])
-def test_frames_at_rest_tell_no_more_than_that_they_are_at_rest(rest):
-    """Independent numbers, a share of frames all the same: at most that share's entropy."""
+def test_frames_at_rest_tell_no_more_than_that_they_rest():
+    """Of independent numbers 40 % are all the same: at most 0.673 nat, the entropy of resting or not."""
     state, action = rng().normal(size=(2048, 1)), rng(1).normal(size=(2048, 1))
-    state[: round(2048 * rest)] = action[: round(2048 * rest)] = 0.0
-    entropy_of_rest = -rest * np.log(rest) - (1 - rest) * np.log(1 - rest)
-    assert mutual_information(state, action, rng(2)).mean() <= entropy_of_rest + 0.05
+    state[:819] = action[:819] = 0.0
+    assert mutual_information(state, action, rng(2)).mean() <= 0.7
 
 
 def test_tracking_error_is_against_the_next_state():

@@ -2,17 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from compare_helpers import condition, judge
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.collection import collected, rate_ratio, success_difference
+from handrail.datasets.comparison.collection import collected, success_difference
 from handrail.datasets.comparison.episodes import differences
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.policies import LIKE_FOR_LIKE, MIXED, Pair, judge_pairs, pairs_between
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
@@ -272,55 +270,3 @@ def test_a_smaller_group_that_varies_more_is_no_difference(few_resamples):
         measured = measure({each.label: each.episodes for each in groups}, generator, metrics=[length])
         called += (differences(groups, measured, "many", generator)[0].p or 0.0) < 0.05
     assert called <= 8
-
-
-def unbalanced(first, others):
-    """Return a condition of one policy with very many rollouts and of nine with few."""
-    shares = [(2000, first), *[(50, others)] * 9]
-    return [
-        Run(0, seed, tuple(range(count)), (np.arange(count) < share * count).astype(float))
-        for seed, (count, share) in enumerate(shares)
-    ]
-
-
-def test_a_policy_with_more_rollouts_counts_as_any_other():
-    """Else the difference would have another sign than the interval over policies."""
-    conditions = {"a": condition("a", unbalanced(0.9, 0.5)), "b": condition("b", unbalanced(0.78, 0.8))}
-    found = judge(conditions, "b", rng(11))
-    (difference,) = found.differences
-    assert difference.estimate == pytest.approx(0.54 - 0.798)
-    for each in (difference, *found.successes.values()):
-        assert each.nested[0] <= each.estimate <= each.nested[1]
-    assert difference.interval[0] > 0.0 > difference.nested[1]  # of all rollouts, of the policies
-    assert not difference.detected
-
-
-def attempts(label, count, share, seconds):
-    """Return episodes of one length, some of them successful."""
-    meta = ({"length": 20 * seconds, "tasks": ["go"], "success": k < share * count} for k in range(count))
-    return Group(label, INFO, tuple(Demonstration(k, INFO, {}, each) for k, each in enumerate(meta)))
-
-
-def test_equal_rates_of_unequal_groups_are_not_taken_for_different(few_resamples):
-    """A small group that varies, against a large one that does not."""
-    generator, small = rng(12), 0
-    for _ in range(60):
-        share = float(generator.binomial(20, 0.5)) / 20
-        small += rate_ratio(attempts("a", 20, share, 5), attempts("b", 100, 1.0, 10), generator).p < 0.05
-    assert small <= 12
-
-
-def test_the_headline_begins_with_detected_differences_and_counts_the_others():
-    groups = [
-        attempts(label, 60, share, 5) for label, share in zip("abcd", (0.9, 0.9, 0.88, 0.1), strict=True)
-    ]
-    ratios = [rate_ratio(each, groups[0], rng(13)) for each in groups[1:]]
-    found = adjusted([*(success_difference(each, groups[0]) for each in groups[1:]), *ratios])
-    values = [value for each in groups for value in collected(each, "", rng(14))]
-    everything = SimpleNamespace(collecting=values)
-    said = headline(
-        SimpleNamespace(unlike=(), outcomes=None, collecting=found, everything=everything, others="bcd")
-    )
-    assert said.startswith("Success while collecting: d 10 %, a 90 %")
-    assert said.count("a difference detected") == 2
-    assert said.endswith("The tables have 3 more.")

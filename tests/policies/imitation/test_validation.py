@@ -8,7 +8,6 @@ import pytest
 from canned import canned
 from training_helpers import refused, tiny, weights, write_dataset
 
-from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.interface.checkpoint import read_meta
 from handrail.policies.imitation.training.selection import hold_out
 from handrail.policies.imitation.training.source import read_source
@@ -70,23 +69,6 @@ def test_it_is_measured_every_so_many_updates_and_after_the_last(measured):
     assert sorted(map(int, found)) == [5, 10, 12]
     assert len({*found.values()}) == 3
     assert train(dataclasses.replace(config, resume=True)) == folder  # nothing is left to do
-
-
-def test_a_training_that_began_with_a_stopping_rule_is_refused(measured, tmp_path):
-    """Earlier versions had `--patience`; its learning rate went another way."""
-    _, config = measured
-    cut = tmp_path / "cut"
-    shutil.copytree(config.folder, cut, symlinks=True)
-    shutil.rmtree(cut / "checkpoints" / "000012")
-    (cut / "checkpoints" / "last").unlink()
-    (cut / "checkpoints" / "last").symlink_to("000008")
-    file = cut / "checkpoints" / "000008" / "pretrained_model" / "handrail.json"
-    content = known_json(file)
-    write_json(file, content | {"training": content["training"] | {"patience": 4, "improvement": 0.02}})
-    again = dataclasses.replace(config, output=str(cut), resume=True)
-    refused(again, "--resume: expected a training of all updates")
-    write_json(file, content | {"training": content["training"] | {"patience": 0, "improvement": 0.02}})
-    assert train(again)
 
 
 def test_measuring_changes_nothing(many, tmp_path):
