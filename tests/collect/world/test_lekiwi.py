@@ -71,7 +71,7 @@ def test_the_jaw_picks_a_cube_up_and_lets_it_go():
     tool = MODEL.pose(HOME)
     edge, mass = ROBOT.world.cube, 0.0125
     x, y, z = map(float, tool.position)
-    thing = cube("cube", x, y, z - edge / 2, 0.0, edge, mass)
+    thing = cube(x, y, z - edge / 2, 0.0, edge, mass)
     simulation = Simulation(MODEL, Scene((thing,)), HOME, 0.05)
     simulation.mujoco_model.opt.gravity[:] = 0.0  # until it is held
     for _ in range(30):
