@@ -28,16 +28,7 @@ class Named(Protocol):
         ...
 
 
-class Handed(Protocol):
-    """A spec that asks hands of a robot."""
-
-    @property
-    def hands(self) -> int:
-        """How many it needs."""
-        ...
-
-
-def fitting[Spec: Handed](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]:
+def fitting[Spec: Any](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]:
     """Return those of some specs that a robot with so many hands can do, by name."""
     return {name: spec for name, spec in specs.items() if spec.hands <= hands}
 

@@ -77,7 +77,7 @@ def run(main: Callable[[], int | None]) -> NoReturn:
         fail(str(interrupt) or "interrupted", INTERRUPTED)
     except Exception as error:
         if interrupts.asked:  # a library that was imported just then made another error of it
-            fail("interrupted", INTERRUPTED)
+            fail(f"interrupted; {error}" if isinstance(error, HandrailError) else "interrupted", INTERRUPTED)
         if isinstance(error, BrokenPipeError):
             sys.exit(FAILED)
         if isinstance(error, HandrailError | OSError):  # such as a name that is too long

@@ -39,6 +39,8 @@ class RecordingLog:
     dropped: list[Outcome] = field(default_factory=list)
     trouble: str = ""
     """The reason why the run ended early."""
+    kept: bool = False
+    """Whether episodes wait beside the dataset, for the same command to go on."""
     exit_code: int = 0
     wall_time: float = 0.0
     """Of the run, where that is not the sum of its episodes' [s]."""
@@ -83,7 +85,8 @@ class RecordingLog:
         for outcome in self.dropped:
             console.print(f"not saved: {_why_dropped(outcome)}, seed {outcome.seed}")
         if not episodes:
-            console.print("no episode was saved: nothing is left behind")
+            if not self.kept:
+                console.print("no episode was saved: nothing is left behind")
             return
         console.print(f"{episodes} episodes, {frames} frames in {root}")
         if advice := packing_advice(root):

@@ -118,7 +118,7 @@ def _record_shared(
     if not log.exit_code:
         with log.noting():
             shards.remove()
-    log.wall_time = time.monotonic() - start
+    log.wall_time, log.kept = time.monotonic() - start, shards.begun
     info = read_info(shards.root)
     return shards.root, info.episodes, info.frames
 

@@ -37,7 +37,7 @@ from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.atomic import beside, explained, remove
-from handrail.datasets.storage.lock import HeldError
+from handrail.datasets.storage.lock import FolderLock, HeldError
 from handrail.datasets.storage.strict_json import load_json, write_json
 
 _FORMAT = "handrail.shards/1"
@@ -74,6 +74,8 @@ class Shards:
 
     def going_on(self) -> RecordConfig:
         """Return the settings that go on with the shards that are there, which must be of this recording."""
+        if (staging := Layout(self.root).staging).exists():  # a recording that still runs
+            FolderLock(staging).release()
         with explained(f"cannot go on with dataset {str(self.root)!r}"):
             settle(self.root)  # a merge that was cut short
         for name, now in self._settings.items():

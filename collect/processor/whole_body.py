@@ -114,7 +114,7 @@ class WholeBody:
             self._heard -= self._time - now
         if reading and self._leaps(reading, now):
             reading = None
-        self._go_on(now)
+        self.pass_time(now)
         if reading and observation is not self._said:
             self._take(reading, now)
         self._said = observation
@@ -125,15 +125,19 @@ class WholeBody:
             )
         stale = "stale_observation" if now - self._heard > self._timeout else ""
         self.trouble = stale if reading else "malformed_observation"
-        self._time = now if math.isfinite(now) else self._time
         v = np.where(self._held, 0.0, self.velocity)
         self.targets = np.where(self._units.sends_position, self.targets, self._reading.arm)
         expected = np.append(self._expected()[: self._b], self.targets)
         return State(np.append(self._now(), self._reading.arm), v, now, self.velocity, expected)
 
     def pass_time(self, now: float) -> None:
-        """Take note that it goes on as it was sent until now [s], before something else is sent."""
-        self._go_on(now)
+        """Take note of how far the base was sent until now [s], said later: `sent - said`, 0 after a rest."""
+        passed = _passed(self._time, now, _HOLD)
+        silent = now - self._heard > _SILENT * self._period
+        self._rested = 0.0 if self._twist.any() or silent else self._rested + passed
+        going = moved(self._expected(), self._twist, passed) - self._base
+        most = 2.0 * _HOLD * self._model.description.limits.velocity[:3]
+        self._under_way = np.zeros(3) if self._rested > _HOLD else np.clip(going, -most, most)
         self._time = now if math.isfinite(now) else self._time
 
     def send(self, command: ArrayLike) -> dict[str, float]:
@@ -172,15 +176,6 @@ class WholeBody:
         return self._reading is not None and bool(
             (np.abs(reading.arm - self._reading.arm) > way + _LEAD).any()
         )
-
-    def _go_on(self, now: float) -> None:
-        """Take note of how far the base was sent, which it says later: `sent - said`, 0 after a rest."""
-        passed = _passed(self._time, now, _HOLD)
-        silent = now - self._heard > _SILENT * self._period
-        self._rested = 0.0 if self._twist.any() or silent else self._rested + passed
-        going = moved(self._expected(), self._twist, passed) - self._base
-        most = 2.0 * _HOLD * self._model.description.limits.velocity[:3]
-        self._under_way = np.zeros(3) if self._rested > _HOLD else np.clip(going, -most, most)
 
     def _take(self, reading: BodyReading, now: float) -> None:
         """Take an observation that makes sense."""

@@ -5,6 +5,7 @@ import io
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 from collections import Counter
@@ -193,3 +194,15 @@ def test_waiting_is_said_before_anything_heavy_is_loaded(words):
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60)
     assert done.stderr.startswith(f"{cli.STARTING}\n"), done.stderr
     assert "ModuleNotFoundError" in done.stderr
+
+
+def test_an_interrupt_names_the_error_that_it_ended_in(capsys):
+    def ends():
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+        raise HandrailError("--output d: No space left on device")
+
+    with pytest.raises(SystemExit) as ended:
+        cli.run(ends)
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "error: interrupted; --output d: No space left on device\n"

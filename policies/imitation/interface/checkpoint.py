@@ -22,7 +22,7 @@ from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.regular_file import is_inside
 from handrail.controllers.typed import Count, Name, NonNegative, Number, decoded
 from handrail.datasets.reading.reader import DatasetInfo
-from handrail.datasets.storage.atomic import sync, write_whole
+from handrail.datasets.storage.atomic import remove, sync, write_whole
 from handrail.datasets.storage.strict_json import load_json
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trust import CONFIG
@@ -162,5 +162,7 @@ def point_to(checkpoint: Path) -> None:
     link, fresh = checkpoint.parent / "last", checkpoint.parent / ".last"
     fresh.unlink(missing_ok=True)
     fresh.symlink_to(checkpoint.name)
+    if link.is_dir() and not link.is_symlink():  # of a copy that followed links
+        remove(link)
     os.replace(fresh, link)
     sync(checkpoint.parent)

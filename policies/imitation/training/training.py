@@ -111,15 +111,15 @@ def _begin(config: TrainConfig) -> Path | None:
     folder, where = config.folder, f"--output {config.output}"
     if folder.exists() and not folder.is_dir():
         raise HandrailError(f"{where}: expected a folder, found a file")
-    if config.resume:
-        return last_checkpoint(folder)
+    if config.resume and (last := last_checkpoint(folder)):
+        return last
     if not folder.exists() or not _MAIN:
         return None
     kept = [path for path in (folder / "checkpoints").glob("*") if not _is_checkpoint(path)]
     others = [path for path in folder.iterdir() if path.name not in _OURS]
     if foreign := sorted(path.relative_to(folder).as_posix() for path in (*others, *kept)):
         raise HandrailError(f"{where}: expected a missing or empty folder, found {', '.join(foreign[:3])}")
-    if any(folder.iterdir()) and not config.overwrite:
+    if any(folder.iterdir()) and not (config.overwrite or config.resume):
         raise HandrailError(f"{where}: there is a training already; say --resume or --overwrite")
     return None
 

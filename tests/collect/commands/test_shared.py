@@ -20,6 +20,7 @@ from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.repair import repair
+from handrail.datasets.storage.lock import FolderLock
 
 # a second each: most fail, which is no matter
 FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3"]
@@ -218,3 +219,16 @@ def test_episodes_set_aside_are_still_there_when_shards_have_become_a_part(tmp_p
     record(root, "--resume", "--workers", "2", episodes=6)
     assert read_info(root).episodes == 7
     assert {path.name: path.read_bytes() for path in (root / ".damaged").rglob("*.parquet")} == kept
+
+
+def test_a_recording_that_runs_is_not_taken_for_one_that_was_cut_short(tmp_path):
+    """Else the advice would be to remove the folder in which it saves."""
+    root = tmp_path / "d"
+    plan(root, 0)
+    lock = FolderLock(Layout(root).staging)
+    refused(root, *FLAGS, "--dataset.num_episodes", 3, told="is being written by another")
+    assert Shards(RecordConfig(dataset=DatasetConfig(root=str(root)))).begun
+    lock.release()
+    refused(
+        root, *FLAGS, "--dataset.num_episodes", 3, told="holds episodes of a recording that was cut short"
+    )

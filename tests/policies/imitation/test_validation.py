@@ -8,7 +8,7 @@ import pytest
 from canned import canned
 from training_helpers import refused, tiny, weights, write_dataset
 
-from handrail.policies.imitation.interface.checkpoint import read_meta
+from handrail.policies.imitation.interface.checkpoint import point_to, read_meta
 from handrail.policies.imitation.training.selection import hold_out
 from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train
@@ -90,3 +90,22 @@ def test_cut_off_anywhere_it_ends_the_same_to_the_bit(measured, tmp_path):
         again = train(dataclasses.replace(config, output=str(cut), resume=True))
         assert weights(again) == weights(folder)
         assert read_meta(again).validation == read_meta(folder).validation
+
+
+def test_a_folder_without_a_training_is_not_resumed_into(tmp_path):
+    """A checkpoint's own folder, a dataset, one with somebody's files: all stay as they are."""
+    made = tmp_path / "p"
+    made.mkdir()
+    (made / "notes.txt").write_text("mine")
+    refused(
+        tiny(canned(write_dataset), made, resume=True), "expected a missing or empty folder, found notes.txt"
+    )
+    assert [path.name for path in made.iterdir()] == ["notes.txt"]
+
+
+def test_a_last_checkpoint_that_a_copy_made_a_folder_becomes_a_link_again(tmp_path):
+    for name in ("000003", "last"):
+        (tmp_path / name / "pretrained_model").mkdir(parents=True)
+    point_to(tmp_path / "000003")
+    assert (tmp_path / "last").is_symlink()
+    assert (tmp_path / "last").resolve() == tmp_path / "000003"
