@@ -117,16 +117,8 @@ class FarClient:
         return self._heard
 
 
-def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: float) -> tuple[int, float]:
-    """Drive a LeKiwi over a network with rude intents; return its contacts, and the base's way [m].
-
-    Args:
-        gap: by which every update is late [s].
-        latency: of commands and observations, each [s].
-        drop: share of the messages that are lost.
-        seed: of the scene and the intents.
-        seconds: how long.
-    """
+def _linked(latency: float, drop: float, seed: int) -> tuple[FarClient, Link, HandrailEnv, MaskedMpc]:
+    """Return a LeKiwi behind a network, the link to it, its environment, and the MPC in its scene."""
     client, model = FarClient(latency, drop, seed), load_model("lekiwi")
     link = client.link = Link(client, "lekiwi", model, 0.05, True, client.clock, client.sleep)
 
@@ -137,7 +129,21 @@ def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: floa
     env.reset(seed=seed)
     mpc = MaskedMpc(model)
     mpc.reset(env.plant.obstacles())
-    rude = RudeOperator(mpc.channels, model.description.limits, np.random.default_rng([seed, 7]))
+    return client, link, env, mpc
+
+
+def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: float) -> tuple[int, float]:
+    """Drive a LeKiwi over a network with rude intents; return its contacts, and the base's way [m].
+
+    Args:
+        gap: by which every update is late [s].
+        latency: of commands and observations, each [s].
+        drop: share of the messages that are lost.
+        seed: of the scene and the intents.
+        seconds: how long.
+    """
+    client, link, env, mpc = _linked(latency, drop, seed)
+    rude = RudeOperator(mpc.channels, env.model.description.limits, np.random.default_rng([seed, 7]))
     before, begun, way, place = client.body.contacts, client.clock.now, 0.0, env.state().q
     while client.clock.now - begun < seconds:
         client.sleep(gap)
@@ -157,16 +163,7 @@ def interrupted_drive(cut: str, seconds: float, seed: int) -> tuple[list[float],
         seconds: how long each time.
         seed: of the scene.
     """
-    client, model = FarClient(0.0, 0.0, seed), load_model("lekiwi")
-    link = client.link = Link(client, "lekiwi", model, 0.05, True, client.clock, client.sleep)
-
-    def plant(robot, scene, q, period, **looks):
-        return ClientPlant(robot, scene, q, link, seed)
-
-    env = HandrailEnv(PickPlace(), "lekiwi", fps=20, real=True, plant=plant)
-    env.reset(seed=seed)
-    mpc = MaskedMpc(model)
-    mpc.reset(env.plant.obstacles())
+    client, link, env, mpc = _linked(0.0, 0.0, seed)
     mask = mpc.channels.mask("base")
 
     def drive(time: float, speed: float) -> None:

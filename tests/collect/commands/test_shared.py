@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 from errno import ENOSPC
+from types import SimpleNamespace
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -15,6 +17,7 @@ from command_helpers import command, refused
 from execution_helpers import is_alive
 from shared_helpers import content, pictures, saved, started, wait_until, workers_of
 
+from handrail.collect.commands.account import RecordingLog
 from handrail.collect.commands.shared import Shards
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.datasets.format.layout import Layout
@@ -232,3 +235,11 @@ def test_a_recording_that_runs_is_not_taken_for_one_that_was_cut_short(tmp_path)
     refused(
         root, *FLAGS, "--dataset.num_episodes", 3, told="holds episodes of a recording that was cut short"
     )
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_nothing_is_said_to_be_left_only_where_nothing_is(tmp_path, kept):
+    said, log = [], RecordingLog(trouble="interrupted", kept=kept)
+    console: Any = SimpleNamespace(print=lambda words, **look: said.append(words))
+    log.report(RecordConfig(), tmp_path, 0, 0, console)
+    assert ("no episode was saved: nothing is left behind" in said) != kept

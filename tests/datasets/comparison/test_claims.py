@@ -9,7 +9,7 @@ from compare_helpers import condition, judge
 
 from handrail.datasets.comparison.collection import collected, rate_ratio, success_difference
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.headline import headline
+from handrail.datasets.comparison.headline import cautions, headline
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics.contrast import adjusted
@@ -72,3 +72,14 @@ def test_the_headline_begins_with_detected_differences_and_counts_the_others():
     assert said.startswith("Success while collecting: d 10 %, a 90 %")
     assert said.count("a difference detected") == 2
     assert said.endswith("The tables have 3 more.")
+
+
+def test_policies_of_unlike_numbers_of_rollouts_are_named():
+    groups = [attempts(label, 20, 0.5, 5) for label in "ab"]
+    everything = SimpleNamespace(groups=groups, differences=[], measurements=SimpleNamespace(metrics=()))
+    for runs, said in ((unbalanced(0.9, 0.5)[1:], False), (unbalanced(0.9, 0.5), True)):
+        found = judge(
+            {"a": condition("a", runs), "b": condition("b", unbalanced(0.8, 0.8)[1:])}, "b", rng(15)
+        )
+        told = cautions(SimpleNamespace(everything=everything, outcomes=found))
+        assert any("different numbers of rollouts" in text for text, holds in told.items() if holds) == said
