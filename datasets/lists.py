@@ -29,9 +29,15 @@ def _split_word(word: str) -> list[str]:
 def _listed(
     kind: type, word: str, read: Callable[[list[str]], Any], words: Callable[[Any], list[str]]
 ) -> PrimitiveConstructorSpec[Any]:
-    """Return how a list of any length is read from words, and said in words again."""
+    """Return how a list is read from words, and said in words again; a flag without a word is refused."""
+
+    def checked(given: list[str]) -> Any:
+        if given and (kind is str or split_list(given)):  # names of none are "", as by default
+            return read(given)
+        raise ValueError(f"expected a {word} or more, got none")
+
     return PrimitiveConstructorSpec(
-        "*", f"[{word} [{word} …]]", read, lambda value: isinstance(value, kind), words
+        "*", f"{word} [{word} …]", checked, lambda value: isinstance(value, kind), words
     )
 
 

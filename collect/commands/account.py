@@ -1,5 +1,6 @@
 """The account of a recording, as it goes and at its end."""
 
+import shlex
 import shutil
 import sys
 from collections import Counter
@@ -130,5 +131,5 @@ def command_prefix() -> str:
     return f"{_from_here(Path(sys.executable).parent)}/"
 
 
-def _from_here(path: Path) -> Path:
-    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
+def _from_here(path: Path) -> str:
+    return shlex.quote(str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path))

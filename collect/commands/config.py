@@ -16,15 +16,10 @@ from handrail.datasets.editing.config import EditConfig
 from handrail.datasets.lists import Names
 
 
-@dataclass(frozen=True)
-class ReplayConfig:
-    """Run a recorded episode's commands in its environment and report the deviation."""
+@dataclass(frozen=True, kw_only=True)
+class TrustConfig:
+    """Names that a dataset may use because the command line does."""
 
-    dataset: StoredConfig = field(default_factory=StoredConfig)
-    episode: int = -1
-    """Which episode; all of them when negative."""
-    video: str = ""
-    """Also film the episode to this .mp4 file (needs OpenGL)."""
     task: Advanced[str] = ""
     """The recorded task where it is a module:name: a dataset alone does not make Handrail import it."""
     mode: Advanced[str] = ""
@@ -32,12 +27,23 @@ class ReplayConfig:
     operator: Advanced[str] = ""
     """The same of the operator."""
     robot: Advanced[str] = ""
-    """The same of the robot."""
+    """The same of the robot; or its description file (.toml), where that is not where it was."""
 
     @property
     def said(self) -> tuple[str, ...]:
-        """Names that the dataset may use because the command line does."""
+        """The names."""
         return (self.task, self.mode, self.operator, self.robot)
+
+
+@dataclass(frozen=True)
+class ReplayConfig(TrustConfig):
+    """Run a recorded episode's commands in its environment and report the deviation."""
+
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    episode: int = -1
+    """Which episode; all of them when negative."""
+    video: str = ""
+    """Also film the episode to this .mp4 file (needs OpenGL)."""
 
     def check(self) -> None:
         """Check the settings."""
@@ -47,7 +53,7 @@ class ReplayConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RenderConfig(EditConfig, ExecutionConfig):
+class RenderConfig(EditConfig, ExecutionConfig, TrustConfig):
     """Write a dataset with pictures of its episodes, drawn while their commands run again.
 
     One that was begun is gone on with.

@@ -1,5 +1,7 @@
 """The demo: a few demonstrations, a table, a picture, and what to try next."""
 
+import shlex
+
 from handrail.collect.commands.account import command_prefix
 from handrail.collect.commands.config import DemoConfig
 from handrail.collect.commands.record import record
@@ -9,7 +11,9 @@ from handrail.collect.config import REPO_ID, DatasetConfig, RecordConfig
 from handrail.collect.session.film import save_sheet
 from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.recording.folder import is_dataset
 
 NEXT = """Next:
   {bin}handrail-cockpit
@@ -32,6 +36,8 @@ def demo(config: DemoConfig) -> int:
         console.print(f"Without pictures: {trouble}")
     cameras = "" if trouble else "wrist,scene"
     root = config.folder / "dataset"
+    if is_dataset(Layout(root)) and not config.overwrite:
+        raise HandrailError(f"{root}: an earlier demo is there; say --overwrite, or choose another folder")
     dataset = DatasetConfig(repo_id=REPO_ID, root=str(root), num_episodes=config.episodes)
     console.print(f"Recording {config.episodes} episodes: the operator steers the hand, the MPC the rest …")
     code = record(RecordConfig(dataset=dataset, cameras=cameras, overwrite=config.overwrite))
@@ -44,6 +50,7 @@ def demo(config: DemoConfig) -> int:
         console.print(f"Picture: {sheet}")
     console.print(f"Dataset: {root}")
     flags = f" --cameras {cameras}" if cameras else ""
-    after = NEXT.format(root=root, folder=config.folder, repo=REPO_ID, cameras=flags, bin=command_prefix())
+    paths = {"root": shlex.quote(str(root)), "folder": shlex.quote(str(config.folder))}
+    after = NEXT.format(**paths, repo=REPO_ID, cameras=flags, bin=command_prefix())
     console.print(*after.splitlines(), sep="\n")
     return 0

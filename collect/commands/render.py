@@ -39,6 +39,7 @@ from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.recording.slice import TRIMMED
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.atomic import beside, explained, remove
+from handrail.datasets.storage.lock import FolderLock
 
 _PICTURES = 32  # of a preview
 _WIDTH = 320  # of one of them [px]
@@ -48,9 +49,19 @@ _LONGEST = 125  # that a picture stays [ms]; a long episode goes by faster than 
 def render(config: RenderConfig) -> None:
     """Write a dataset with pictures; one that was begun is gone on with."""
     check_whole(config.root, config.verify)
+    with explained(f"--output {config.output}: cannot be written"):
+        alone = FolderLock(beside(config.target, "lock"), f"--output {config.output}", "handrail-edit render")
+    with alone:
+        _render(config)
+    info = read_info(config.target)
+    Terminal().print(f"{config.target}: {info.episodes} episodes, {info.frames} frames")
+
+
+def _render(config: RenderConfig) -> None:
     with open_dataset(config.root) as dataset:
-        for settings in dict.fromkeys(replace(recorded_settings(row), **config.seen) for row in dataset.rows):
-            settings.check()
+        recorded = [recorded_settings(row, config.said) for row in dataset.rows]
+        for settings in dict.fromkeys(recorded):
+            replace(settings, **config.seen).check()
         first, end = _begun(config, dataset), len(dataset.rows)
     folder = beside(config.target, "pictures")
     jobs = part_jobs(draw, config, folder / "part", first, end)
@@ -67,8 +78,6 @@ def render(config: RenderConfig) -> None:
         merge_datasets([*[config.target] * bool(first), *parts], config.target, config.name)
     with explained(f"cannot remove {str(folder)!r}"):
         remove(folder)
-    info = read_info(config.target)
-    Terminal().print(f"{config.target}: {info.episodes} episodes, {info.frames} frames")
 
 
 def _begun(config: RenderConfig, dataset: OpenDataset) -> int:
@@ -78,23 +87,27 @@ def _begun(config: RenderConfig, dataset: OpenDataset) -> int:
         check_target(layout, overwrite=False)
         return 0
     manifest.check_fits(read_manifest(layout), f"--output {config.output}: cannot add to it")
-    there = _which(read_episodes(config.target))
-    if there != _which(dataset.rows[: len(there)], config.randomise):
+    there = _which(read_episodes(config.target), config)
+    if there != _which(dataset.rows[: len(there)], config, config.randomise):
         raise HandrailError(f"--output {config.output}: expected episodes of {config.root}, found others")
     return len(there)
 
 
-def _which(rows: Sequence[Mapping[str, Any]], randomise: bool = False) -> list[tuple[Any, ...]]:
+def _which(
+    rows: Sequence[Mapping[str, Any]], config: RenderConfig, randomise: bool = False
+) -> list[tuple[Any, ...]]:
     """Return what tells episodes from others, also from those of the same seeds or with other looks."""
     names = ("seed", "started", "length")
-    return [(*map(row.get, names), randomise or recorded_settings(row).randomise) for row in rows]
+    return [
+        (*map(row.get, names), randomise or recorded_settings(row, config.said).randomise) for row in rows
+    ]
 
 
 def _manifest(config: RenderConfig, dataset: OpenDataset) -> Manifest:
     """Return the schema of the dataset with pictures."""
     manifest = read_manifest(Layout(config.root))
     numbers = {key: each for key, each in manifest.features.items() if not each.is_video}
-    look = SessionConfig(robot=_one_robot(dataset), **config.seen)
+    look = SessionConfig(robot=_one_robot(dataset, config), **config.seen)
     cameras = {PICTURE + name: Feature("video", (*look.image_shape, 3)) for name in look.camera_names}
     observed = {key: each for key, each in numbers.items() if key.startswith("observation.")}
     name = config.name or manifest.repo_id
@@ -112,8 +125,8 @@ def draw(config: RenderConfig, part: Path, first: int, episodes: int) -> None:
     """
     with open_dataset(config.root) as dataset:
         layout, manifest = Layout(part), _manifest(config, dataset)
-        there = _which(read_episodes(part)) if row_files(layout) else []
-        wanted = _which(dataset.rows[first : first + episodes], config.randomise)
+        there = _which(read_episodes(part), config) if row_files(layout) else []
+        wanted = _which(dataset.rows[first : first + episodes], config, config.randomise)
         if there and there == wanted[: len(there)] and read_manifest(layout).features == manifest.features:
             writer = EpisodeWriter.resume(part, manifest)
         else:
@@ -121,17 +134,17 @@ def draw(config: RenderConfig, part: Path, first: int, episodes: int) -> None:
             writer = EpisodeWriter.create(part, manifest, overwrite=True, types=types)
         with writer:
             for episode in range(first + writer.num_episodes, first + episodes):
-                _draw(dataset, episode, writer, config.seen)
+                _draw(dataset, episode, writer, config)
 
 
-def _one_robot(dataset: OpenDataset) -> str:
-    robots = {recorded_settings(row).robot for row in dataset.rows}
+def _one_robot(dataset: OpenDataset, config: RenderConfig) -> str:
+    robots = {recorded_settings(row, config.said).robot for row in dataset.rows}
     if len(robots) != 1:
         raise HandrailError(f"dataset {dataset.info.root}: expected episodes of one robot, got {len(robots)}")
     return robots.pop()
 
 
-def _draw(dataset: OpenDataset, episode: int, writer: EpisodeWriter, seen: Mapping[str, Any]) -> None:
+def _draw(dataset: OpenDataset, episode: int, writer: EpisodeWriter, config: RenderConfig) -> None:
     """Add an episode with what its cameras see; one whose replay is not exact is refused."""
     row = dataset.row(episode)
     names = [key for key, each in writer.features.items() if not each.is_video]
@@ -145,7 +158,7 @@ def _draw(dataset: OpenDataset, episode: int, writer: EpisodeWriter, seen: Mappi
         pictures = {PICTURE + name: each for name, each in observation["pixels"].items()}
         writer.add_frame({name: each[frame] for name, each in columns.items()} | pictures, tasks[frame])
 
-    found, _ = replay_one_of(dataset, episode, seen=seen, observe=observe)
+    found, _ = replay_one_of(dataset, episode, said=config.said, seen=config.seen, observe=observe)
     if found.largest or writer.open_frames != len(tasks):
         writer.discard_episode()
         trimmed = "its beginning was trimmed, so draw before you trim"
@@ -156,7 +169,7 @@ def _draw(dataset: OpenDataset, episode: int, writer: EpisodeWriter, seen: Mappi
         )
     extras = {name: value for name, value in row.items() if is_extra(name) and value is not None}
     if extras.get(SETTINGS):
-        extras[SETTINGS] = json.dumps(json.loads(extras[SETTINGS]) | seen)
+        extras[SETTINGS] = json.dumps(json.loads(extras[SETTINGS]) | config.seen)
     writer.save_episode(extras)
 
 

@@ -1,5 +1,6 @@
 """Makes a robot of a URDF, and checks robots."""
 
+import shlex
 import time
 from pathlib import Path
 
@@ -38,7 +39,7 @@ def new_robot(config: NewRobotConfig) -> int:
     say(
         f"wrote {path} in {time.monotonic() - began:.0f} s: {model.size} degrees of freedom, "
         f"{len(robot.collision)} shapes, {len(robot.self_pairs)} pairs that can meet; "
-        f"next: handrail-robot check {path} --picture robot.png"
+        f"next: handrail-robot check {shlex.quote(str(path))} --picture robot.png"
     )
     return 0
 

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from multiprocessing import connection, forkserver, parent_process
+from multiprocessing import connection, forkserver, parent_process, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 
@@ -25,12 +25,19 @@ _GRACE = 10.0  # for what a process saves just now, before it is killed [s]
 def begin_loading(modules: Sequence[str]) -> ForkServerContext:
     """Start the server that workers are forked from, if it does not run yet, and return what forks.
 
+    Ctrl-C is this process's to hear, also while the server loads.
+
     Args:
         modules: that every worker needs; the first call says which.
     """
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([_THREADS, *modules])
-    forkserver.ensure_running()
+    resource_tracker.ensure_running()  # the server starts it otherwise, and lets signals through again
+    heard = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
     return context
 
 

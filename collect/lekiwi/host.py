@@ -18,7 +18,9 @@ from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, imported, message_of
 from handrail.controllers.registry import resolved
+from handrail.controllers.robot.description import load_description
 from handrail.controllers.robot.model import load_model
+from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.strict_json import write_json
 
 _FPS = 60  # of the simulation [Hz]
@@ -75,6 +77,10 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> NoReturn:
     """Run the host until Ctrl-C."""
     model = load_model(config.robot)
     units = robot_units("lekiwi", model.description)
+    expected = robot_units("lekiwi", load_description("lekiwi")).action_names
+    if units.action_names != expected:
+        names = ", ".join(expected)
+        raise HandrailError(f"--robot {config.robot}: expected a LeKiwi (its action is {names}), got another")
     task = resolved(TASKS.find(config.task).task)()
     render = "rgb_array" if config.cameras else None
     env = HandrailEnv(task, model, fps=_FPS, render_mode=render)
@@ -95,6 +101,7 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> NoReturn:
         body.close()
         env.close()
         summary = loop.summary()
-        if config.json:
-            write_json(Path(config.json).expanduser(), summary)
         say(json.dumps({name: value for name, value in summary.items() if name != "episodes"}))
+        if config.json:
+            with explained(f"--json {config.json}"):
+                write_json(Path(config.json).expanduser(), summary)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 from handrail.collect.config import SessionConfig
@@ -18,6 +18,7 @@ _OLDER = {"environment": "task"} | {  # what an episode said before it kept ever
     name: name for name in ("robot", "operator", "mode", "noise", "person", "moving_obstacles")
 }
 _GONE = ("inner_error", "tremor")  # of a person, whom older episodes say more of than there is now
+_FILE = ".toml"  # of a robot: a path, which is another one on another computer
 _WHERE = "settings of the episode"
 _NAMES = {"task": TASKS, "mode": MODES, "operator": OPERATORS, "robot": ROBOTS}
 
@@ -34,7 +35,8 @@ def recorded_settings(row: Mapping[str, Any], said: Collection[str] = ()) -> Ses
     Args:
         row: the episode's line of metadata. An older one says only its task, its robot and a few more: the
             rest is as by default.
-        said: the names of the command line; others that are `module:name` are refused.
+        said: the names of the command line; others that are `module:name` are refused. A description file
+            of a robot takes the place of the recorded one.
     """
     content = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
     if isinstance(content, dict) and isinstance(content.get("human"), dict):
@@ -42,6 +44,8 @@ def recorded_settings(row: Mapping[str, Any], said: Collection[str] = ()) -> Ses
     config = decoded(content, SessionConfig, _WHERE)
     if missing := {"task", "robot"} - set(content):
         raise HandrailError(f"{_WHERE}: expected entries task and robot, found no {', '.join(missing)}")
+    if config.robot.endswith(_FILE):
+        config = replace(config, robot=next((name for name in said if name.endswith(_FILE)), config.robot))
     for name, registry in _NAMES.items():
         registry.admit(getattr(config, name), said)
     config.check()

@@ -10,6 +10,7 @@ exports/                     tables for whoever reads them: CSV, JSON, README.tx
 """
 
 import os
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -85,7 +86,7 @@ class StudyFolder:
     def lock(self) -> FolderLock:
         """Return the right to change the study."""
         with explained(f"cannot write {str(self.root)!r}"):
-            return FolderLock(self.root / ".handrail", "study", "handrail-user-study")
+            return FolderLock(self.root / ".handrail", f"study {str(self.root)!r}", "handrail-user-study")
 
     def participants(self) -> dict[str, Participant]:
         """Return everybody who has begun, by id."""
@@ -167,7 +168,7 @@ class StudyFolder:
         if not self._written.exists():
             raise HandrailError(
                 f"{str(self.root)!r}: expected a folder with study.toml, found none;"
-                f" write one: handrail-user-study new {self.root}"
+                f" write one: handrail-user-study new {shlex.quote(str(self.root))}"
             )
         return read_toml(self._written, "study")
 

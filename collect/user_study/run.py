@@ -1,5 +1,6 @@
 """The verbs of `handrail-user-study`."""
 
+import shlex
 import time
 from collections.abc import Callable
 
@@ -24,11 +25,12 @@ def study_session(config: StudySessionConfig) -> int:
     folder, say = StudyFolder(config.folder), Terminal(stderr=True).print
     if config.verb == "new":
         say(f"Written: {folder.write_example()}")
-        say(f"Change it, then: handrail-user-study run {folder.root} P001")
+        say(f"Change it, then: handrail-user-study run {shlex.quote(str(folder.root))} P001")
         return 0
+    study = folder.study  # there is one, before anything is made in the folder
     if config.verb == "status":
         console = Terminal()
-        console.print(f"{folder.study.title} ({folder.study.source})")
+        console.print(f"{study.title} ({study.source})")
         console.print(status(folder) if folder.participants() else "nobody has begun")
         return 0
     with folder.lock():
@@ -89,5 +91,5 @@ def _run(config: StudySessionConfig, folder: StudyFolder, say: Callable[[str], N
         say(f"{who.name} does not take part: nothing is kept")
         return
     export(folder)
-    again = f"; go on: handrail-user-study run {folder.root} {who.name}"
+    again = f"; go on: handrail-user-study run {shlex.quote(str(folder.root))} {who.name}"
     say(f"{who.name}: {ending}" + (again if ending is Ending.PAUSED else f"; tables in {folder.exports}"))

@@ -93,7 +93,7 @@ class TrimConfig(EditConfig):
 
     verb = "trim"
     episodes: Words = ()
-    """Which episodes: 3, 0-4, failed, succeeded; all when empty."""
+    """Which episodes: 3, 0-4, failed, succeeded; all by default."""
     margin: float = 0.25
     """Time to leave before the first motion and after the last [s]."""
 
@@ -135,7 +135,7 @@ class RenameConfig(EditConfig):
     old_task: str = ""
     """The sentence that it replaces; all of them when empty."""
     episodes: Words = ()
-    """Which episodes: 3, 0-4, failed, succeeded; all when empty."""
+    """Which episodes: 3, 0-4, failed, succeeded; all by default."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """A dataset that episodes are taken from: one that Handrail recorded, whole."""
 
+import shlex
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -90,7 +91,7 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
         if settle(target):
             raise HandrailError(
                 f"dataset {str(target)!r}: an edit was cut short, and is finished now; look at it"
-                f" (handrail-inspect {target}) before the next"
+                f" (handrail-inspect {shlex.quote(str(target))}) before the next"
             )
         if target not in roots:
             if target.exists() and (not target.is_dir() or any(target.iterdir())):
@@ -105,6 +106,6 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
             if own.layout.damaged.exists():
                 raise HandrailError(
                     f"dataset {str(target)!r}: in {own.layout.damaged.name} are episodes that were set aside,"
-                    " or files of none; some may have to go too: remove that folder"
+                    " or files of none, which the edit does not see: move that folder elsewhere first"
                 )
             yield [own if root == target else EditSource.open(root, verify) for root in roots]

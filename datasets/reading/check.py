@@ -1,6 +1,7 @@
 """Checking a dataset before it is used: is everything there that was saved, and is it what was saved?"""
 
 import os
+import shlex
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -39,16 +40,17 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
 def check_report(root: str | Path) -> list[str]:
     """Return everything that is wrong with a dataset, a line each; every byte is read."""
     info, found = _surveyed(root, verify=True)
+    repair = f"handrail-edit repair {shlex.quote(str(info.root))}"
     if found is None:
         faults = [*(f"{name}: missing" for name in sorted(_missing(info))), *_unreadable(info)]
     else:
-        advice = f"if another tool wrote it on purpose, handrail-edit repair {info.root} takes it as it is"
+        advice = f"if another tool wrote it on purpose, {repair} takes it as it is"
         other = f"other content than was saved, but the right frames; {advice}"
         unknown = [f"{found.layout.relative(path)}: no file of a LeRobot dataset" for path in found.unknown]
         faults = [*found.damage, *(f"{name}: {other}" for name in found.rewritten), *unknown]
         totals, said = found.totals, "meta/info.json: does not count the episodes that are there"
         if not found.damage and (info.episodes, info.frames) != (totals.episodes, totals.frames):
-            faults.append(f"{said}; handrail-edit repair {info.root} writes it anew")
+            faults.append(f"{said}; {repair} writes it anew")
     layout = Layout(info.root)
     summary = (layout.stats, layout.tasks) if info.episodes else ()
     faults += [f"{path.name}: missing" for path in summary if not path.exists()]
@@ -58,6 +60,11 @@ def check_report(root: str | Path) -> list[str]:
     except (OSError, ValueError) as error:
         faults.append(f"meta/{layout.stats.name}: {error}")
     return faults
+
+
+def has_checksums(root: str | Path) -> bool:
+    """Return whether there is something to compare a dataset with; another tool writes no checksums."""
+    return _surveyed(root, verify=False)[1] is not None
 
 
 def _surveyed(root: str | Path, verify: bool) -> tuple[DatasetInfo, Survey | None]:

@@ -3,6 +3,7 @@
 Pictures are not read here; `LeRobotDataset` does that.
 """
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -63,8 +64,9 @@ def read_info(root: str | Path) -> DatasetInfo:
     """Read what a dataset is."""
     layout = Layout(Path(root).expanduser().absolute())
     where = str(layout.root)
+    advice = f"handrail-edit repair {shlex.quote(where)}"
     if not layout.root.is_dir():
-        repair = f", or handrail-edit repair {where}" if beside(layout.root, "old").is_dir() else ""
+        repair = f", or {advice}" if beside(layout.root, "old").is_dir() else ""
         raise HandrailError(f"dataset {where!r}: expected a folder, found none; check the path{repair}")
     if not layout.info.is_file() and not layout.manifest.is_file():
         raise HandrailError(f"{where!r} is not a LeRobot dataset (no meta/info.json); check the path")
@@ -73,7 +75,7 @@ def read_info(root: str | Path) -> DatasetInfo:
         if not isinstance(content, dict):
             raise ValueError("no JSON object")
     except UNREADABLE as error:
-        advice = f" handrail-edit repair {where} rebuilds it" if layout.manifest.is_file() else _DAMAGED
+        advice = f" {advice} rebuilds it" if layout.manifest.is_file() else _DAMAGED
         raise _torn(layout.info, error, advice) from error
     version = str(content.get("codebase_version"))
     if not version.startswith("v3."):
@@ -242,5 +244,5 @@ def _torn(path: Path, error: Exception, advice: str = _DAMAGED) -> HandrailError
 
 
 def _advice(info: DatasetInfo) -> str:
-    again = " copy it again"
-    return f"{again}, or see what handrail-edit repair {info.root} says" if info.from_handrail else again
+    repair = f", or see what handrail-edit repair {shlex.quote(str(info.root))} says"
+    return " copy it again" + repair * info.from_handrail

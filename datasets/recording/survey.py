@@ -4,6 +4,7 @@ A file with the checksum that it had when it was saved is whole. One with anothe
 `reencode_videos` for instance, or is damaged: it is whole if it still decodes to the episode's frames.
 """
 
+import shlex
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -74,8 +75,8 @@ class Survey:
         what = "was copied in part" if all("missing" in each for each in self.damage) else "is damaged"
         raise HandrailError(
             f"dataset {str(root)!r} {what}: {len(self.damage)} of {self.episodes} episodes are not whole"
-            f" ({shortened(self.damage)}); nothing has been changed; copy it again, see what"
-            f" handrail-edit repair {root} can mend, or go on without them with its --set_aside"
+            f" ({shortened(self.damage)}); nothing has been changed; copy it again, see what handrail-edit"
+            f" repair {shlex.quote(str(root))} can mend, or go on without them with its --set_aside"
         )
 
 

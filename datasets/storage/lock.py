@@ -19,12 +19,12 @@ class HeldError(HandrailError):
 class FolderLock:
     """The right to change one folder, held from construction to `release`."""
 
-    def __init__(self, staging: Path, thing: str = "dataset", holder: str = "recorder"):
+    def __init__(self, staging: Path, thing: str = "", holder: str = "recorder"):
         """Take the lock.
 
         Args:
             staging: The folder of the lock's file; created if missing.
-            thing: The locked thing, in words.
+            thing: The locked thing, in words and with its name; empty for the dataset that the folder is in.
             holder: The program that may hold it, in words.
 
         Raises:
@@ -32,7 +32,7 @@ class FolderLock:
             OSError: The folder cannot be written.
         """
         self._path = staging / LOCK_NAME
-        self._thing, self._holder = thing, holder
+        self._thing, self._holder = thing or f"dataset {str(staging.parent)!r}", holder
         self._file: BinaryIO | None = self._acquire()
 
     def release(self) -> None:
@@ -65,8 +65,8 @@ class FolderLock:
             except OSError as error:
                 file.close()
                 raise HeldError(
-                    f"{self._thing} {str(self._path.parent.parent)!r} is being written by another"
-                    f" {self._holder}: expected to be the only one; close the other, or choose another folder"
+                    f"{self._thing} is being written by another {self._holder}: expected to be the only one;"
+                    " close the other, or choose another name"
                 ) from error
             if self._is_current(file):
                 return file

@@ -50,7 +50,7 @@ def run_study(config: StudyConfig, work: Work = do, isolated: bool = True) -> in
     if config.page:
         with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
     with explained(f"--output {config.output}: expected a folder that can be written"):
-        lock = FolderLock(config.folder / ".study", "study", "handrail-study")
+        lock = FolderLock(config.folder / ".study", f"study {config.output!r}", "handrail-study")
     with lock:
         done = config.report_only or _work(config, progress, console, work, isolated)
         from handrail.policies.study.report import write_study

@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from handrail.collect.config import SessionConfig
+from handrail.collect.execution.config import MOST_WORKERS
 from handrail.collect.flags import check_file, one_of
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
@@ -45,7 +46,7 @@ class EncoderConfig:
     """Of the scenes and the first weights."""
     device: Advanced[str] = "cpu"
     """Where it learns: cpu, cuda, mps."""
-    workers: Advanced[Count] = 1
+    workers: Advanced[Annotated[int, Meta(ge=0, le=MOST_WORKERS)]] = 1
     """Processes that draw scenes; 0 draws them in between."""
     threads: Advanced[AtLeastOne] = 1
     """Of PyTorch."""

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import asdict
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.storage.atomic import beside
+from handrail.datasets.storage.atomic import beside, explained, write_whole
 from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.encoder.config import EncoderConfig
 from handrail.policies.imitation.encoder.samples import DRIVEN, START, Drawn, Samples, batches
@@ -40,7 +41,7 @@ _LOOK = 0.3  # how much it counts where an eye looks
 def train(config: EncoderConfig) -> None:
     """Train an encoder, or go on with it, and print how far off it is."""
     config.check()
-    lock = FolderLock(beside(config.file.resolve(), "lock"), "encoders in", "handrail-encoder")
+    lock = FolderLock(beside(config.file.resolve(), "lock"), f"--output {config.output}", "handrail-encoder")
     with lock, threads(config.threads), Interrupts() as interrupts, interrupts.deferred():
         training = _Training(config)
         console = Terminal(stderr=True)
@@ -162,9 +163,10 @@ class _Training:
     def save(self) -> None:
         """Keep where the training stands."""
         content = {"settings": self._settings, "at": (self._update, self._chunk)}
-        temporary = self._draft.with_suffix(".partial")
-        torch.save(content | {"parts": [part.state_dict() for part in self._parts]}, temporary)
-        temporary.replace(self._draft)
+        data = BytesIO()
+        torch.save(content | {"parts": [part.state_dict() for part in self._parts]}, data)
+        with explained(f"cannot write {str(self._draft)!r}"):
+            write_whole(self._draft, data.getvalue())
 
     def _load(self) -> None:
         try:

@@ -16,7 +16,7 @@ from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
-from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.atomic import beside, explained
 from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -64,7 +64,7 @@ def evaluate(
     path, alone = Path(config.json).expanduser() if config.json else None, nullcontext()
     if path:
         with explained(f"--json {path}"):
-            alone = FolderLock(path.with_name(f".{path.name}.lock"), "rollouts in", "handrail-evaluate")
+            alone = FolderLock(beside(path, "lock"), f"--json {path}", "handrail-evaluate")
     with alone:
         conditions, refused = policy_conditions(config)
         file = EvaluationFile(path, conditions)

@@ -28,7 +28,7 @@ from torch import Tensor
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.controllers.typed import Count, Name, decoded
-from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.network import Network
 from handrail.policies.imitation.interface.relative import POSE, POSITION
@@ -126,7 +126,8 @@ class Encoder:
 
     def save(self, path: Path) -> None:
         """Write the encoder to a file, its weights as float16."""
-        write_whole(path, self._bytes)
+        with explained(f"cannot write {str(path)!r}"):
+            write_whole(path, self._bytes)
 
     @property
     def _bytes(self) -> bytes:

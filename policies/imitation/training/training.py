@@ -50,8 +50,8 @@ def train(config: TrainConfig) -> Path:
         config: what to train on what.
     """
     config.check()
-    lock = beside(Path(os.path.realpath(config.folder)), "lock"), "trainings in", "handrail-train"
-    with in_one_line(config), FolderLock(*lock) if _MAIN else nullcontext():
+    lock, output = beside(Path(os.path.realpath(config.folder)), "lock"), f"--output {config.output}"
+    with in_one_line(config), FolderLock(lock, output, "handrail-train") if _MAIN else nullcontext():
         checkpoint = _begin(config)
         began = None if checkpoint is None else _checked(config, checkpoint)
         weights, known = checkpoint and checkpoint / MODEL, began
