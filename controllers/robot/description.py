@@ -104,7 +104,7 @@ def load_description(robot: str | Path) -> RobotDescription:
     path = Path(robot) if str(robot).endswith(".toml") else ROBOTS.find(str(robot)).file
     if not path.is_file():
         raise HandrailError(
-            f"unknown robot {str(robot)!r}: expected a .toml file or one of {', '.join(robot_names())}"
+            f"unknown robot {str(robot)!r}: expected --robot FILE.toml or one of {', '.join(robot_names())}"
         )
     return described(read_toml(path, "robot description"), path)
 

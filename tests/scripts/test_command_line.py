@@ -119,7 +119,7 @@ FLAGS = [(name, flag) for name, config in CONFIGS.items() for flag in list_flags
 
 
 @pytest.mark.parametrize(("name", "flag"), FLAGS)
-def test_a_list_is_written_with_commas_or_spaces(name, flag):
+def test_a_list_is_written_with_commas_or_spaces(name, flag, capsys):
     assert len(FLAGS) > 12
     needed = NEEDED.get(name, ["x"] if name.startswith("handrail-edit") else [])
     values = {
@@ -127,6 +127,9 @@ def test_a_list_is_written_with_commas_or_spaces(name, flag):
         for written in ("1 2", "1,2", "1, 2", "'1,2'", "1,2,")
     }
     assert len(values) == 1, values
+    with pytest.raises(SystemExit):  # as where a shell's variable is empty
+        cli.parse(CONFIGS[name], name, [*needed, f"--{flag}"])
+    assert f"--{flag}: expected one " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("config", COMMAND_CONFIGS.values())

@@ -97,6 +97,13 @@ def test_an_existing_dataset_is_never_overwritten_nor_continued_by_another_recor
     assert stamps(recorded) == before
 
 
+def test_a_demo_never_replaces_an_earlier_one(tmp_path):
+    root = copied(tmp_path / "dataset", record_in_its_own_process)
+    before = stamps(root)
+    refused(tmp_path, name="demo", told="an earlier demo is there; say --overwrite")
+    assert stamps(root) == before
+
+
 def test_resume_of_nothing_and_a_folder_that_cannot_be_written_are_refused(tmp_path):
     refused(*REACH, "--dataset.root", tmp_path / "none", "--resume")
     assert not (tmp_path / "none").exists()

@@ -38,6 +38,7 @@ def test_the_first_time_it_is_new_and_then_it_goes_on(tmp_path):
     assert root == tmp_path / "outputs" / "cockpit" / "reach"
     assert config.dataset.folder.absolute() == root
     assert next_commands(root)[0].endswith("handrail-inspect outputs/cockpit/reach")  # zsh takes no comments
+    assert next_commands(root.parent / "my set")[1].endswith("handrail-replay 'outputs/cockpit/my set'")
     assert opened()[0] == root
     with open_writer(located(PLAIN, ENV), ENV):  # one that is being written is left alone
         assert opened()[0].name == "reach-2"

@@ -9,9 +9,12 @@ from shared_helpers import content, pictures
 
 from handrail.collect.commands import render
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.robot.model import load_model
 from handrail.datasets.reading.reader import OpenDataset, open_dataset, read_episodes, read_info
 from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.lock import FolderLock
 
 pytestmark = pytest.mark.needs_gl
 
@@ -233,3 +236,25 @@ def test_wrong_settings_are_one_line(words, told, tmp_path):
     refused(*words, name="edit render", told=told)
     refused(recorded(), "--in_place", "--cameras", "wrist", name="edit render", told="expected --output")
     assert not list(tmp_path.iterdir())
+
+
+def test_two_never_draw_one_dataset(tmp_path):
+    output = tmp_path / "drawn"
+    with FolderLock(tmp_path / ".drawn.lock"):
+        refused(
+            recorded(), "--output", output, *LOOK, name="edit render", told="by another handrail-edit render"
+        )
+    assert not output.exists()
+
+
+def test_a_robot_whose_description_is_elsewhere_now_is_told(tmp_path):
+    before, now, root = tmp_path / "then.toml", tmp_path / "now.toml", tmp_path / "set"
+    before.write_text(ROBOTS["lekiwi"].file.read_text())
+    record(root, "--robot", before, episodes=1)
+    before.rename(now)
+    load_model.cache_clear()  # as in another process
+    refused(root, name="replay", told=f"unknown robot {str(before)!r}")
+    assert "0.00e+00" in ran(root, "--robot", now, name="replay")
+    refused(root, "--output", tmp_path / "drawn", *LOOK, name="edit render", told="--robot FILE.toml")
+    drawn(root, tmp_path / "drawn", "--robot", now)
+    assert read_info(tmp_path / "drawn").episodes == 1

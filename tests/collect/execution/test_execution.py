@@ -233,3 +233,26 @@ def test_a_cluster_without_ray_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(HandrailError, match=r"--ray auto: expected ray, found none; .* '.\[cluster\]'"):
         ExecutionConfig(ray="auto").check_execution()
+
+
+def test_an_interrupt_while_the_modules_of_workers_load_is_this_process_s_alone(tmp_path):
+    (tmp_path / "slow.py").write_text(
+        "import pathlib, time; pathlib.Path('loading').touch(); time.sleep(1.5)"
+    )
+    code = """
+import time
+from handrail.collect.execution.pool import begin_loading
+try:
+    begin_loading(["slow"])
+    time.sleep(60)
+except KeyboardInterrupt:
+    print("heard")
+"""
+    words, pipe = [sys.executable, "-c", code], subprocess.PIPE
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    with subprocess.Popen(
+        words, stdout=pipe, stderr=pipe, text=True, cwd=tmp_path, env=environment, start_new_session=True
+    ) as process:
+        wait_until((tmp_path / "loading").exists)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        assert process.communicate(timeout=60) == ("heard\n", "")

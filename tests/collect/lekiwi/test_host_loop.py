@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from command_helpers import refused
 
+from handrail.collect.lekiwi import host
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT, LeKiwiLoop, Wire
 from handrail.collect.processor.units import robot_units
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.reach import Reach
+from handrail.controllers.errors import HandrailError
 
 STILL = {"x.vel": 0.0, "y.vel": 0.0, "theta.vel": 0.0}
 AHEAD = {**STILL, "x.vel": 0.1}
@@ -144,8 +146,26 @@ def test_cameras_say_jpegs_of_lekiwis_sizes_and_a_lost_one_says_nothing(monkeypa
         (["--cameras", "front,back"], "unknown camera 'back'"),
         (["--port_zmq_cmd", "5556"], "expected two ports"),
         (["--task", "juggle"], "unknown task 'juggle'"),
-        (["--robot", "ridgeback_ur10", "--address", "nowhere"], "nowhere"),
+        (["--address", "nowhere"], "nowhere"),
+        (["--robot", "ridgeback_ur10"], "expected a LeKiwi"),
+        (["--robot", "bi_so101"], "expected a LeKiwi"),
     ],
 )
 def test_wrong_settings_are_named(words, said):
     refused(*words, name="lekiwi host", told=said)
+
+
+def test_what_it_saw_is_said_also_where_it_cannot_be_written(tmp_path, monkeypatch):
+    class NoSockets:
+        receive = close = staticmethod(list)
+
+    def interrupt(seconds):
+        raise KeyboardInterrupt
+
+    said = []
+    monkeypatch.setattr(host, "HostSockets", lambda config: NoSockets())
+    monkeypatch.setattr(host.time, "sleep", interrupt)
+    (tmp_path / "saw.json").mkdir()
+    with pytest.raises(HandrailError, match=r"--json .*saw\.json: Is a directory"):
+        host.serve(HostConfig(json=str(tmp_path / "saw.json")), said.append)
+    assert json.loads(said[-1])["commands"] == 0

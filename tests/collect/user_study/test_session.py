@@ -4,6 +4,7 @@ import random
 import shutil
 
 import pytest
+from command_helpers import refused
 from datasets_guillotine import Guillotine
 from datasets_helpers import TINY_FEATURES, create, record_one
 from user_study_helpers import (
@@ -81,6 +82,14 @@ def test_an_id_that_may_be_a_name_is_refused(name, tmp_path):
     with pytest.raises(HandrailError, match="expected an id that says nothing of the person"):
         session(folder, name)
     assert not (tmp_path / "participants").exists()
+
+
+@pytest.mark.parametrize("verb", ["status", "run", "erase", "export"])
+def test_a_folder_that_is_not_there_is_not_made(verb, tmp_path):
+    typo = tmp_path / "my study"
+    advice = f"write one: handrail-user-study new '{typo}'"
+    refused(verb, typo, *["P001"] * (verb in ("run", "erase")), name="user-study", told=advice)
+    assert not typo.exists()
 
 
 def test_practice_lasts_until_enough_successes_in_a_row_and_is_not_recorded(tmp_path):

@@ -78,7 +78,7 @@ def test_a_lock_whose_folder_was_replaced_frees_nobody_elses(tmp_path):
     (tmp_path / "set").rename(tmp_path / "old")
     with FolderLock(staging):
         first.release()
-        with pytest.raises(HeldError):
+        with pytest.raises(HeldError, match=f"dataset '{tmp_path / 'set'}' is being written by another"):
             FolderLock(staging)
     assert not staging.exists()
 

@@ -97,6 +97,7 @@ def test_a_dataset_of_lerobot_copied_in_part_is_named_as_such(tmp_path):
     root = lerobot_dataset(tmp_path / "set", JOINTS, 30, 0.0, camera=True)
     check_whole(root)
     assert check_report(root) == []
+    assert ran("--dataset.root", root, "--check", name="inspect").startswith("checked: all can be read (no ")
     next(root.glob("videos/*/*/*.mp4")).unlink()
     with pytest.raises(HandrailError, match=r"copied in part: .* files are missing \(videos/"):
         check_whole(root)

@@ -1,12 +1,14 @@
 """An encoder that learns, for a few updates, from small pictures; and a policy that looks through it."""
 
 import dataclasses
+import errno
 import json
 
 import numpy as np
 import pytest
 import torch
 from canned import record_by_command
+from datasets_helpers import tree
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.datasets.dataset_tools import remove_feature
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -15,6 +17,7 @@ from lerobot.policies.factory import make_pre_post_processors
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import open_dataset
+from handrail.datasets.storage import atomic
 from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.encoder.config import EncoderConfig
@@ -250,6 +253,20 @@ def test_two_trainings_never_write_one_encoder(tmp_path):
     ):
         train(settings)
     assert not settings.file.with_suffix(".training").exists()
+
+
+def test_a_full_disk_is_one_line_and_keeps_the_draft(tmp_path, monkeypatch):
+    settings = config(tmp_path, updates=1)
+    train(settings)
+    before = tree(tmp_path)
+
+    def full(path, data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(atomic, "write_synced", full)
+    with pytest.raises(HandrailError, match=r"cannot write .*e\.training': No space left on device"):
+        train(dataclasses.replace(settings, updates=2))
+    assert tree(tmp_path) == before
 
 
 def test_an_encoder_that_is_there_is_never_replaced_unasked(tmp_path):
