@@ -1,7 +1,8 @@
 """The one error root."""
 
+import contextlib
 import importlib.util
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
@@ -18,9 +19,23 @@ class HandrailError(Exception):
 
 
 def message_of(error: BaseException) -> str:
-    """Return what an exception says, in one line of sane length; its type where it says nothing."""
+    """Return what an exception says, in one line of sane length; its type where it says nothing.
+
+    Our own say all that they have to say.
+    """
+    if isinstance(error, HandrailError):
+        return str(error)
     words = " ".join(str(error).split()) or type(error).__name__
     return words if len(words) <= _LONGEST_MESSAGE else f"{words[:_LONGEST_MESSAGE]} …"
+
+
+@contextlib.contextmanager
+def restated(what: str, kinds: type[Exception] | tuple[type[Exception], ...] = Exception) -> Iterator[None]:
+    """Make one of our errors, `what: why`, of an error of these kinds in the block."""
+    try:
+        yield
+    except kinds as error:
+        raise HandrailError(f"{what}: {message_of(error)}") from error
 
 
 def first_line(error: BaseException) -> str:

@@ -15,12 +15,15 @@ class Interrupts:
     """Ends what runs on Ctrl-C or SIGTERM: at once between saves, after it during one.
 
     Outside of the main thread, which alone hears signals, it changes nothing.
+
+    Attributes:
+        asked: whether an interrupt has come.
     """
 
     _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
     def __enter__(self) -> Self:
-        self._deferring = self._asked = False
+        self._deferring = self.asked = False
         hears = threading.current_thread() is threading.main_thread()
         signals = self._SIGNALS if hears else ()
         self._previous = {number: signal.signal(number, self._interrupt) for number in signals}
@@ -31,15 +34,10 @@ class Interrupts:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
         sys.unraisablehook = self._unraisable
-        if self._asked and (outer := _current()):
-            outer._asked = True
-        if self._asked and kind is SystemError:  # a compiled library made it of the interrupt
+        if self.asked and (outer := _current()):
+            outer.asked = True
+        if self.asked and kind is SystemError:  # a compiled library made it of the interrupt
             raise KeyboardInterrupt
-
-    @property
-    def asked(self) -> bool:
-        """Whether an interrupt has come."""
-        return self._asked
 
     @contextlib.contextmanager
     def deferred(self) -> Iterator[None]:
@@ -49,11 +47,11 @@ class Interrupts:
             yield
         finally:
             self._deferring = False
-        if self._asked:
+        if self.asked:
             raise KeyboardInterrupt
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        self._asked = True
+        self.asked = True
         if not self._deferring:
             raise KeyboardInterrupt
 

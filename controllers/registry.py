@@ -7,25 +7,11 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import metadata
-from typing import Any, Protocol
+from typing import Any
 
-from handrail.controllers.errors import HandrailError, message_of, unknown_name
+from handrail.controllers.errors import HandrailError, restated, unknown_name
 
 _REFERENCE = re.compile(r"[\w.]+:\w+")
-
-
-class Named(Protocol):
-    """An entry of a registry: a frozen dataclass with a name and a line of help."""
-
-    @property
-    def name(self) -> str:
-        """Its name on the command line and in the data."""
-        ...
-
-    @property
-    def help(self) -> str:
-        """One line."""
-        ...
 
 
 def fitting[Spec: Any](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]:
@@ -33,7 +19,7 @@ def fitting[Spec: Any](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]
     return {name: spec for name, spec in specs.items() if spec.hands <= hands}
 
 
-class Registry[Spec: Named](Mapping[str, Spec]):
+class Registry[Spec: Any](Mapping[str, Spec]):
     """Specs by name: what comes with Handrail, then what installed packages add by entry points.
 
     Their group is `handrail.<thing>s`; they are imported when they are asked for. The names in this mapping
@@ -43,7 +29,7 @@ class Registry[Spec: Named](Mapping[str, Spec]):
     Args:
         thing: in one word: for messages, the flag and the entry points.
         kind: of the specs.
-        built_in: what comes with Handrail.
+        built_in: what comes with Handrail; each has a name and, where a flag takes it, a line of help.
     """
 
     def __init__(self, thing: str, kind: type[Spec], built_in: Iterable[Spec]) -> None:
@@ -118,10 +104,8 @@ def resolved(value: Callable[..., Any] | str, where: str = "") -> Any:
     if not isinstance(value, str):
         return value
     module, _, name = value.partition(":")
-    try:
+    with restated(f"{where or value}: cannot import it"):  # whatever another package's code raises
         return getattr(importlib.import_module(module), name)
-    except Exception as error:  # whatever another package's code raises
-        raise HandrailError(f"{where or value}: cannot import it: {message_of(error)}") from error
 
 
 @cache

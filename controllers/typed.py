@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from handrail.controllers.arrays import frozen
-from handrail.controllers.errors import HandrailError, shown
+from handrail.controllers.errors import HandrailError, restated, shown
 
 Number = Annotated[float, Meta(ge=-1e6, le=1e6)]
 """A number of a file [SI units]: beyond this it is a slip, or meant ill."""
@@ -117,10 +117,8 @@ def decoded[T](content: Any, kind: type[T], where: str) -> T:
         raise HandrailError(f"{where}: expected an entry {missing[0]!r}, found none")
     types = _types(kind)
     values = {name: _value(content[name], types[name], f"{where}: {name}") for name in content}
-    try:
+    with restated(where, HandrailError):
         return kind(**values)
-    except HandrailError as error:
-        raise HandrailError(f"{where}: {error}") from error
 
 
 def check_names(content: Mapping[Any, Any], known: Mapping[str, Any], where: str) -> None:

@@ -81,7 +81,7 @@ def run(main: Callable[[], int | None]) -> NoReturn:
         if isinstance(error, BrokenPipeError):
             sys.exit(FAILED)
         if isinstance(error, HandrailError | OSError):  # such as a name that is too long
-            fail(str(error) if isinstance(error, HandrailError) else message_of(error), BAD_INPUT)
+            fail(message_of(error), BAD_INPUT)
         raise
 
 

@@ -11,7 +11,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
-from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.atomic import explained
 
 LASTS = datetime.timedelta(days=365)
 _ELSEWHERE = ("192.0.2.1", 9)  # an address for examples: asked for a way there, the system says its own
@@ -27,11 +27,9 @@ def certificate(host: str, folder: Path) -> tuple[Path, Path]:
     names = _names(host)
     is_secret = key.is_file() and not key.stat().st_mode & 0o077
     if not (is_secret and _is_valid(cert, names)):
-        try:
+        with explained(f"certificate in {folder}"):
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             _make(names, cert, key)
-        except OSError as error:
-            raise HandrailError(f"certificate in {folder}: {error.strerror}") from error
     return cert, key
 
 

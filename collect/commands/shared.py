@@ -26,11 +26,11 @@ from handrail.collect.session.build import build_env
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import settings_json
 from handrail.collect.world.env import HandrailEnv
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.typed import Count, decoded
 from handrail.datasets.editing.merge import copy_episodes
 from handrail.datasets.editing.source import EditSource
-from handrail.datasets.format.episode_rows import each_record
+from handrail.datasets.format.episode_rows import EpisodeRows, row_files
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.rewrite import settle
@@ -143,16 +143,15 @@ class Shards:
         sources = [EditSource.open(root) for root in roots]
         before = sources[0].slices() if self._plan.first else ()
         new = chain.from_iterable(_slices(job, sources[0].manifest) for job in jobs)
-        try:
+        with restated(f"{str(self.folder)!r} cannot be read", (pa.ArrowException, ValueError, KeyError)):
             copy_episodes(sources, self.root, chain(before, new), in_place=True)
-        except (pa.ArrowException, ValueError, KeyError) as error:
-            raise HandrailError(f"{str(self.folder)!r} cannot be read: {message_of(error)}") from error
 
 
 def _slices(job: Job, manifest: Manifest) -> Iterator[EpisodeSlice]:
     """Yield the episodes of a shard."""
     layout = Layout(job.arguments[1])
-    records = list(each_record(layout))
+    rows = map(EpisodeRows.read, row_files(layout))
+    records = list(chain.from_iterable(each.records(with_stats=True) for each in rows))
     if len(records) != job.size:
         raise HandrailError(
             f"dataset {str(layout.root)!r}: expected {job.size} episodes, found {len(records)}"

@@ -15,7 +15,7 @@ from handrail.collect.devices.calibration import (
 )
 from handrail.collect.devices.leader_arm import connected, make_teleoperator
 from handrail.collect.teleop_config import CalibrateConfig
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.robot.description import RobotDescription
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.presentation.terminal import Terminal
@@ -119,10 +119,8 @@ class _Guide:
 
     def _positions(self) -> Positions:
         """Return what the leader says now."""
-        try:
+        with restated("leader arm: cannot be read"):  # whatever a driver's code raises
             positions = {name: float(value) for name, value in self._read().items()}
-        except Exception as error:  # whatever a driver's code raises
-            raise HandrailError(f"leader arm: cannot be read: {message_of(error)}") from error
         if not positions or not all(map(math.isfinite, positions.values())):
             raise HandrailError("leader arm: expected joint positions, got none that are finite numbers")
         return positions

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from handrail.collect.devices.device import DeviceInput
 from handrail.collect.processor.units import number
 from handrail.collect.teleop_config import LeaderConfig
-from handrail.controllers.errors import HandrailError, message_of, unknown_name
+from handrail.controllers.errors import HandrailError, message_of, restated, unknown_name
 
 if TYPE_CHECKING:
     from lerobot.teleoperators.teleoperator import Teleoperator
@@ -130,10 +130,8 @@ def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
         )
     given = {name: value for name, value in (("port", config.port), ("id", config.id)) if value}
     given |= dict(option.split("=", 1) for option in options)
-    try:
+    with restated(f"--teleop.type {config.type}"):  # whatever a driver's code raises
         return make_teleoperator_from_config(draccus.decode(known[config.type], given))
-    except Exception as error:  # whatever a driver's code raises
-        raise HandrailError(f"--teleop.type {config.type}: {message_of(error)}") from error
 
 
 def leader_types() -> Mapping[str, Any]:

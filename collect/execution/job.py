@@ -90,9 +90,7 @@ def attempt_alone(job: Job) -> Result:
 
 def _words(error: BaseException) -> str:
     """Return why a job failed, in one line; print where too, if nobody expects such an error."""
-    if isinstance(error, HandrailError):
-        return str(error)
-    if isinstance(error, OSError):
+    if isinstance(error, HandrailError | OSError):
         return message_of(error)
     traceback.print_exception(error)
     return f"{type(error).__name__}: {message_of(error)}"

@@ -8,7 +8,6 @@ import numpy as np
 
 from handrail.collect.processor.units import RobotUnits, number
 from handrail.collect.world.env import HandrailEnv
-from handrail.collect.world.rendering import Painter
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import turned
 
@@ -36,7 +35,6 @@ class LeKiwiBody:
         assert units.base is not None
         assert units.grippers[0] is not None
         self._env, self._units, self._base, self._grip = env, units, units.base, units.grippers[0]
-        self._painters: dict[str, Painter] = {}
 
     def reset(self, seed: int) -> None:
         """Begin an episode."""
@@ -97,15 +95,7 @@ class LeKiwiBody:
 
     def picture(self, camera: str) -> np.ndarray:
         """Return what a camera of LeKiwi's sees, (height, width, 3)."""
-        now = self._env.simulation
-        if camera not in self._painters:
-            self._painters[camera] = Painter(SIZES[camera])
-        return self._painters[camera].paint(now.mujoco_model, now.data, camera)
-
-    def close(self) -> None:
-        """Give the OpenGL contexts back."""
-        while self._painters:
-            self._painters.popitem()[1].close()
+        return self._env.paint(camera, camera, SIZES[camera])
 
     def _step(self) -> None:
         state = self._env.state()

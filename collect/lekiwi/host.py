@@ -98,7 +98,6 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> NoReturn:
             time.sleep(max(_PERIOD - (time.monotonic() - now), 0.0))
     finally:
         sockets.close()
-        body.close()
         env.close()
         summary = loop.summary()
         say(json.dumps({name: value for name, value in summary.items() if name != "episodes"}))

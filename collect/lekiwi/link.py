@@ -5,7 +5,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
-from handrail.controllers.errors import HandrailError, imported, message_of
+from handrail.controllers.errors import HandrailError, imported, restated
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import DEAD_MAN_TIME
 from handrail.controllers.robot.model import RobotModel
@@ -28,15 +28,6 @@ _LATE = 1.5  # periods after a command, from which the next one is late
 _MOST_BRAKING = 200  # periods
 _GONE = 2.0  # without a usable observation for so long, the robot is gone [s]
 _log = logging.getLogger(__name__)
-
-
-@contextlib.contextmanager
-def _explained(what: str) -> Iterator[None]:
-    """Turn whatever a driver's code raises into one line that says what failed."""
-    try:
-        yield
-    except Exception as error:
-        raise HandrailError(f"{what}: {message_of(error)}") from error
 
 
 class Link:
@@ -88,7 +79,7 @@ class Link:
         self.asked: Callable[[], EpisodeEvent | None] = lambda: None
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._episode, self._seed = 0, 0
-        with _explained(f"--robot_client {name}: cannot be reached"):
+        with restated(f"--robot_client {name}: cannot be reached"):
             client.connect()
         self._heard = self._deadline = clock()
         try:
@@ -107,11 +98,11 @@ class Link:
     def exchange(self, command: ArrayLike) -> NDArray[np.floating]:
         """Send a command, wait for the end of the period, and listen; return what was sent, (n + 1,)."""
         late = self._clock() - self._deadline > DEAD_MAN_TIME
-        with _explained(f"robot {self._name}: cannot be reached"), self._lock:
+        with restated(f"robot {self._name}: cannot be reached"), self._lock:
             self._send(command)
         sent = self.body.sent
         self._wait(0.5)
-        with _explained(f"robot {self._name}: cannot be reached"), self._lock:
+        with restated(f"robot {self._name}: cannot be reached"), self._lock:
             self._client.send_action(self._action)
         self._wait(0.5)
         self._catch_up() if late else self._listen()
@@ -184,7 +175,7 @@ class Link:
                 return
 
     def _listen(self) -> None:
-        with _explained(f"robot {self._name}: cannot be heard"):
+        with restated(f"robot {self._name}: cannot be heard"):
             said = self._client.get_observation()
         now = self._clock()
         with self._lock:

@@ -13,7 +13,6 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_env, build_mode
 from handrail.collect.world.env import Observation
 from handrail.collect.world.observation import MOST, WIDTH, box_space, to_numbers
-from handrail.collect.world.rendering import Painter
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 
@@ -48,7 +47,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     ) -> None:
         env = build_env(config, fps, render_size)
         super().__init__(env)
-        self._env, self._first_seed, self._painter = env, first_seed, None
+        self._env, self._first_seed = env, first_seed
         own = build_mode(config, env.model) if mode else _WHOLE
         channels = Channels.of(env.model.description)
         self._actions = tuple(ModeAction(each, channels, env.model.hand.name) for each in (own, _WHOLE))
@@ -89,15 +88,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
 
     def render(self) -> NDArray[np.uint8]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a quick picture from the scene camera: LeRobot films every step of ten episodes."""
-        now = self._env.simulation
-        self._painter = self._painter or Painter(self._env.render_size)
-        return self._painter.paint(now.mujoco_model, now.data, "scene")
-
-    def close(self) -> None:
-        """Give the OpenGL contexts back."""
-        if self._painter:
-            self._painter.close()
-        self._env.close()
+        return self._env.paint("evaluation", "scene", self._env.render_size)
 
     def _space_shown(self, plain: spaces.Space[Any]) -> spaces.Dict:
         assert isinstance(plain, spaces.Dict)

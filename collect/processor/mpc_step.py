@@ -29,7 +29,7 @@ from msgspec import Meta
 from handrail.collect.processor.partial_intent import PartialIntent
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.frames import Frames
@@ -208,7 +208,5 @@ def load_pipeline(folder: str | Path, clock: Callable[[], float] = time.monotoni
             raise HandrailError(f"processor {file}: expected the step {NAME} alone")
     if isinstance(robot := config.get("robot"), str):
         ROBOTS.admit(robot)
-    try:
+    with restated(f"processor {file}", HandrailError):
         return mpc_pipeline(MaskedMpcStep(**config, clock=clock))
-    except HandrailError as error:
-        raise HandrailError(f"processor {file}: {error}") from error

@@ -167,10 +167,8 @@ class WholeBody:
 
     def _leaps(self, reading: BodyReading, now: float) -> bool:
         """Return whether a joint is where it cannot have come since it was heard, or the base is too fast."""
-        fastest, way = (
-            self._model.description.limits.velocity[:3],
-            self._fastest * max(now - self._heard, 0.0),
-        )
+        fastest = self._model.description.limits.velocity[:3]
+        way = self._fastest * max(now - self._heard, 0.0)
         if self._b and bool((np.abs(reading.twist) > _PUSHED * fastest).any()):
             return True
         return self._reading is not None and bool(

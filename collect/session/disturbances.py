@@ -7,9 +7,9 @@ import numpy as np
 
 from handrail.collect.operators.operator import EpisodeEvent, Operator, View
 from handrail.collect.world.env import HandrailEnv
-from handrail.collect.world.scene import Scene, SceneObject
+from handrail.collect.world.scene import FrozenArrays, Scene, SceneObject
 from handrail.collect.world.task import Start, Task
-from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
@@ -83,17 +83,13 @@ class OtherPictures:
 
 
 @dataclass(frozen=True)
-class Push:
+class Push(FrozenArrays):
     """A force that acts for a moment."""
 
     start: float  # when it begins [s]
     end: float  # when it ends [s]
     hand: bool  # whether it acts at the tool point, else on the base's centre
     direction: FloatArray  # in the world, (3,); horizontal on the base
-
-    def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "direction", frozen(self.direction))
 
 
 def sample_pushes(seed: int, time_limit: float) -> tuple[Push, ...]:

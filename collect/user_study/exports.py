@@ -4,7 +4,6 @@ They are made anew from the participants' files and the datasets every time: not
 """
 
 import json
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,12 +19,11 @@ from handrail.collect.user_study.questionnaires import (
     tlx_raw,
     tlx_weighted,
 )
+from handrail.controllers.strict_toml import read_toml
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.csv_file import csv_text
 
-COLUMNS: Mapping[str, Mapping[str, str]] = tomllib.loads(
-    (Path(__file__).parent / "columns.toml").read_text(encoding="utf-8")
-)
+COLUMNS: Mapping[str, Mapping[str, str]] = read_toml(Path(__file__).with_name("columns.toml"), "columns")
 """The columns of each table, and what they mean."""
 _SCORES: Mapping[str, tuple[Callable[..., float | None], tuple[str, ...]]] = {  # and the forms they need
     "tlx_raw": (tlx_raw, (TLX,)),

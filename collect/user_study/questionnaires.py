@@ -5,7 +5,6 @@ research, Advances in Psychology 52 (1988), 139-183. Scales and words are those 
 J. Brooke, SUS: a "quick and dirty" usability scale, Usability Evaluation in Industry (1996), 189-194.
 """
 
-import tomllib
 from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
@@ -14,11 +13,10 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.user_study.items import Answer, Form, Item
+from handrail.controllers.strict_toml import read_toml
 
 TLX, TLX_PAIRS, SUS = "tlx", "tlx_pairs", "sus"
-_WORDS: Mapping[str, Any] = tomllib.loads(
-    (Path(__file__).parent / "questionnaires.toml").read_text(encoding="utf-8")
-)
+_WORDS: Mapping[str, Any] = read_toml(Path(__file__).with_name("questionnaires.toml"), "questionnaires")
 SCALES: tuple[str, ...] = tuple(scale["name"] for scale in _WORDS["tlx"])
 PAIRS = tuple(combinations(SCALES, 2))
 STATEMENTS = tuple(f"q{number + 1}" for number in range(len(_WORDS["sus"]["statements"])))

@@ -223,7 +223,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Return what cameras see now, `image_size` each; a simulation without any needs a `render_mode`."""
         if self.real:
             return dict(self.plant.pictures(cameras, self.image_size))
-        return {camera: self._paint("pixels", camera, self.image_size) for camera in cameras}
+        return {camera: self.paint("pixels", camera, self.image_size) for camera in cameras}
 
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""
@@ -237,9 +237,10 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a good-looking picture from the scene camera, if `render_mode` is `rgb_array`."""
-        return self._paint("render", SCENE_CAMERA, self.render_size) if self.render_mode else None
+        return self.paint("render", SCENE_CAMERA, self.render_size) if self.render_mode else None
 
-    def _paint(self, use: str, camera: str, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def paint(self, use: str, camera: str, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Return a picture of a camera, (height, width, 3); each use keeps a painter of its own."""
         now = self.simulation
         painter = self._painters.get(use) or Painter(size, pretty=use == "render")
         self._painters[use] = painter

@@ -134,10 +134,8 @@ def _shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
     for obstacle in obstacles:
         place, body = Pose(obstacle.position, obstacle.rotation), spec.worldbody
         if obstacle.held:
-            tool, body = (
-                model.pinocchio.frames[model.frame_id(obstacle.frame)].placement,
-                spec.site(obstacle.frame).parent,
-            )
+            tool = model.pinocchio.frames[model.frame_id(obstacle.frame)].placement
+            body = spec.site(obstacle.frame).parent
             place = Pose(tool.act(obstacle.position), tool.rotation @ obstacle.rotation)
         body.add_geom(
             name=obstacle.name,

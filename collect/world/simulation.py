@@ -17,7 +17,7 @@ from handrail.collect.world.robot import BASE_BODY, build_robot, grasp_geoms
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.stage import add_scene
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -67,13 +67,11 @@ class Simulation(Plant):
         self._gate = gate or Gate(model, step, tuple(float(width is not None) for width in held))
         substeps = math.ceil(step / timestep - 1e-9)
         self._shares = np.arange(1, substeps + 1) / substeps
-        try:
+        trouble = f"robot {model.description.name} in its scene: MuJoCo says"
+        with restated(trouble, ValueError):  # such as two of one name
             spec = _robot(model, meshes, grips, step / substeps).copy()
             add_scene(spec, scene)
             self.mujoco_model = spec.compile()
-        except ValueError as error:  # such as two of one name
-            where = f"robot {model.description.name} in its scene"
-            raise HandrailError(f"{where}: MuJoCo says: {message_of(error)}") from error
         self.data = mujoco.MjData(self.mujoco_model)
         self._held_at = -math.inf  # what was held then is known
         self._servos = [FingersServo.of(self.mujoco_model, hand) if grips else None for hand in hands]

@@ -21,9 +21,8 @@ class IntentSource:
     name: str  # which one; what the controller's Ψ heard of it is remembered by it
     intent: Intent  # what it asks for
     weight: float | FloatArray = 1.0  # w ≥ 0 of its tracking term, one or one a channel, (m,)
-    predict: Prediction | None = (
-        None  # Ψ of this source, which remembers nothing; the controller's by default
-    )
+    predict: Prediction | None = None
+    """Ψ of this source, which remembers nothing; the controller's by default."""
 
     def share(self) -> FloatArray:
         """Return its weight on each channel, 0 where it owns none, (m,)."""
@@ -138,9 +137,8 @@ class OfSources:
 
     predict: Prediction  # the controller's Ψ
     largest: FloatArray  # what a command of each channel is cut to, (m,)
-    first: Prediction | None = (
-        None  # the controller's Ψ before it heard anything; None where that is `predict`
-    )
+    first: Prediction | None = None
+    """The controller's Ψ before it heard anything; None where that is `predict`."""
     own: tuple[tuple[str, Prediction], ...] = ()  # by source
 
     def after(self, intent: Intent) -> "OfSources":

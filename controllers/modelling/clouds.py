@@ -11,7 +11,7 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.robot.model import RobotModel, read_urdf
 from handrail.controllers.robot.parts import Arm, Placement
 from handrail.controllers.robot.urdf import mesh_files, urdf_text
@@ -58,11 +58,9 @@ def geometry_models(arm: Arm) -> tuple[pin.GeometryModel, pin.GeometryModel]:
     """Return the collision and the visual geometry that a URDF names."""
     robot, text = read_urdf(arm), urdf_text(arm)
     list(mesh_files(arm.urdf, arm.mesh_root))  # refuses those outside
-    try:
+    with restated(f"URDF {arm.urdf}", (ValueError, RuntimeError)):
         read = partial(pin.buildGeomFromUrdfString, robot, text, package_dirs=[str(arm.mesh_root)])
         return read(pin.COLLISION), read(pin.VISUAL)
-    except (ValueError, RuntimeError) as error:
-        raise HandrailError(f"URDF {arm.urdf}: {message_of(error)}") from error
 
 
 type Links = dict[str, LinkCloud]  # by their names

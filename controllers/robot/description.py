@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.errors import HandrailError, check_known
+from handrail.controllers.errors import HandrailError, check_known, restated
 from handrail.controllers.numerics.rotation import matrix_to_axis
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.parts import (
@@ -113,10 +113,8 @@ def described(tables: Mapping[str, Any], path: Path) -> RobotDescription:
     """Return the robot that the tables of a description file say, which lies at a path."""
     where = f"robot description {path}"
     file = decoded(tables, _File, where)
-    try:
+    with restated(where, HandrailError):
         return _described(file, path.parent)
-    except HandrailError as error:
-        raise HandrailError(f"{where}: {error}") from error
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path, PurePosixPath
 
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.regular_file import is_inside, read_regular, regular
 from handrail.controllers.robot.parts import Arm
 
@@ -119,20 +119,16 @@ def mesh_files(urdf: Path, folder: Path) -> Iterator[Path]:
             raise HandrailError(
                 f"URDF {urdf}: mesh {name!r:.80}: expected package://PATH, a file in {folder}"
             )
-        try:
+        with restated(f"URDF {urdf}: mesh {name!r:.80}", OSError):
             yield regular(place)
-        except OSError as error:
-            raise HandrailError(f"URDF {urdf}: mesh {name!r:.80}: {message_of(error)}") from error
 
 
 def _parsed(urdf: Path) -> ET.Element:
-    try:
+    with restated(f"URDF {urdf}", (OSError, ValueError, ET.ParseError, RecursionError)):
         data = read_regular(urdf, _MOST_BYTES)
         if b"<!DOCTYPE" in data:
             raise ValueError("expected XML, and no DOCTYPE")
         return ET.fromstring(data)
-    except (OSError, ValueError, ET.ParseError, RecursionError) as error:
-        raise HandrailError(f"URDF {urdf}: {message_of(error)}") from error
 
 
 def _is_sane(word: str) -> bool:

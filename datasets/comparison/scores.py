@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from handrail.controllers.errors import HandrailError, message_of, shown
+from handrail.controllers.errors import HandrailError, restated, shown
 from handrail.controllers.regular_file import read_regular
 from handrail.controllers.typed import decoded
 from handrail.datasets.statistics.contrast import Measure
@@ -48,13 +48,11 @@ def read_scores(path: Path) -> tuple[Score, ...]:
     if not path.exists():
         return ()
     known: dict[tuple[str, str, str], Score] = {}
-    try:
+    with restated(repr(str(path)), (OSError, ValueError, csv.Error, HandrailError)):
         for each in _rows(path):
             if known.setdefault((each.participant, each.condition, each.score), each) is not each:
                 twice = f"{each.participant} {each.condition} {each.score}"
                 raise HandrailError(f"expected each score once, got {twice} twice")
-    except (OSError, ValueError, csv.Error, HandrailError) as error:
-        raise HandrailError(f"{str(path)!r}: {message_of(error)}") from error
     return tuple(known.values())
 
 

@@ -16,7 +16,7 @@ import fsspec
 import numpy as np
 from huggingface_hub import HfApi
 
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, message_of, restated
 from handrail.controllers.regular_file import regular
 from handrail.datasets.presentation.markdown import markdown_table, markdown_text
 from handrail.datasets.presentation.table import Table
@@ -226,10 +226,9 @@ def _write_card(root: Path, repo_id: str, license_id: str) -> str:
     from lerobot.datasets.utils import create_lerobot_dataset_card
 
     said = _description(root)
-    try:
+    trouble = f"dataset {str(root)!r}: LeRobot cannot read meta/info.json"
+    with restated(trouble, (AttributeError, TypeError, ValueError)):
         info = load_info(root)
-    except (AttributeError, TypeError, ValueError) as error:
-        raise HandrailError(f"dataset {str(root)!r}: LeRobot cannot read meta/info.json: {error}") from error
     told = {"license": license_id, "repo_id": repo_id, "dataset_description": said}
     card = create_lerobot_dataset_card(tags=list(TAGS), dataset_info=info, **told)
     with explained(f"cannot write {str(path)!r}"):

@@ -169,12 +169,6 @@ def row_files(layout: Layout) -> list[Path]:
     return sorted(layout.episodes.glob("*/*.parquet"))
 
 
-def each_record(layout: Layout) -> Iterator[EpisodeRecord]:
-    """Yield the episodes of a dataset that Handrail wrote, with statistics, a group in memory at a time."""
-    for path in row_files(layout):
-        yield from EpisodeRows.read(path).records(with_stats=True)
-
-
 def count_rows(path: Path) -> int:
     """Return how many rows a file has; one if it cannot be read, since it was made for one at least."""
     try:

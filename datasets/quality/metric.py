@@ -21,11 +21,6 @@ class Metric(Measure):
     """Whether an episode's value depends on the others, on their number and on neighbours that they share."""
 
     @property
-    def help(self) -> str:
-        """Its meaning."""
-        return self.meaning
-
-    @property
     def is_of_motion(self) -> bool:
         """Whether it measures what moves; of several hands, that is each of them."""
         return self.needs in ("motion", "position")

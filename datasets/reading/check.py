@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.episode_rows import ForeignRowError
 from handrail.datasets.format.layout import FOLDERS, Layout
@@ -91,11 +91,10 @@ def _surveyed(root: str | Path, verify: bool) -> tuple[DatasetInfo, Survey | Non
 def _missing(info: DatasetInfo) -> list[str]:
     """Return the data and video files that the episodes name and that are not there."""
     rows, cameras = read_episodes(info.root), video_keys(info.features)
-    try:
+    trouble = f"dataset {str(info.root)!r}: meta/episodes names no files"
+    with restated(trouble, (KeyError, ValueError, TypeError)):
         names = [info.data_file(row) for row in rows]
         names += [info.video_file(row, camera) for camera in cameras for row in rows]
-    except (KeyError, ValueError, TypeError) as error:
-        raise HandrailError(f"dataset {str(info.root)!r}: meta/episodes names no files: {error}") from error
     return [name for name in dict.fromkeys(names) if not (info.root / name).is_file()]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.errors import HandrailError, check_known, unknown_name
+from handrail.controllers.errors import HandrailError, check_known, restated, unknown_name
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import decoded
 from handrail.policies.imitation.config import TrainConfig
@@ -201,14 +201,12 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
 def check_jobs(design: StudyDesign) -> None:
     """Check the settings of every job of a study before one begins."""
     for job in jobs(design):
-        try:
+        with restated(f"study {design.name}, {job.name}", HandrailError):
             recording(job.cell, design, _DATASET).check()
             if job.policy:
                 training(job.policy, design, _DATASET, _POLICY).check()
                 for config in evaluations(job, design).values():
                     config.check()
-        except HandrailError as error:
-            raise HandrailError(f"study {design.name}, {job.name}: {error}") from error
 
 
 def _some(config: Any, names: tuple[str, ...]) -> dict[str, Any]:

@@ -68,9 +68,7 @@ def cube(
     return standing("cube", box(size), x, y, bottom, yaw, mass=mass, friction=1.0, **looks)
 
 
-def open_bin(
-    name: str, x: float, y: float, bottom: float, inner: float, height: float, scale: float = 1.0
-) -> SceneObject:
+def open_bin(x: float, y: float, bottom: float, inner: float, height: float, scale: float) -> SceneObject:
     """Return a square bin without a lid, 1 cm · scale thick; to the controller it is one box [m]."""
     wall = 0.01 * scale
     outer = inner + 2 * wall
@@ -80,7 +78,7 @@ def open_bin(
         parts.append(block((wall, outer, height - wall), [away, 0.0, wall / 2]))
         parts.append(block((inner, wall, height - wall), [0.0, away, wall / 2]))
     looks = {"rgba": _BIN, "work_surface": True, "parts": tuple(parts)}
-    return standing(name, box([outer, outer, height]), x, y, bottom, **looks)
+    return standing("bin", box([outer, outer, height]), x, y, bottom, **looks)
 
 
 def pillar(name: str, x: float, y: float, radius: float, height: float) -> SceneObject:
@@ -119,9 +117,8 @@ def tray(
     parts.append(block((bar, width, bar), [0.0, 0.0, height], STEEL))
     shape = box([length, width, 2 * (height + bar)])
     position = handle - rotation @ np.array([0.0, 0.0, height])
-    return SceneObject(
-        name, shape, position, rotation, rgba=_TRAY, mass=mass, parts=tuple(parts), friction=0.35
-    )
+    looks = {"rgba": _TRAY, "parts": tuple(parts)}
+    return SceneObject(name, shape, position, rotation, mass=mass, friction=0.35, **looks)
 
 
 def crate(

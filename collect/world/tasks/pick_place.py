@@ -138,7 +138,7 @@ def _sample_bin(on: SceneObject, world: WorldScale, rng: np.random.Generator, le
     inner = scale * rng.uniform(0.24, 0.28) + length / 2
     x = on.front + inner / 2 + scale * rng.uniform(0.04, 0.10)
     y = on.position[1] + scale * rng.uniform(-0.12, 0.12)
-    return open_bin("bin", x, y, on.top, inner, scale * _BIN_HEIGHT, scale)
+    return open_bin(x, y, on.top, inner, scale * _BIN_HEIGHT, scale)
 
 
 def _in_bin(state: TaskState, position: FloatArray) -> tuple[FloatArray, FloatArray]:

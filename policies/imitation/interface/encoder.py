@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, message_of, unknown_name
+from handrail.controllers.errors import HandrailError, restated, unknown_name
 from handrail.controllers.typed import Count, Name, decoded
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -104,22 +104,18 @@ class Encoder:
     @classmethod
     def load(cls, path: Path) -> "Encoder":
         """Read an encoder from its file; that runs no code of whoever made it."""
-        try:
-            with safe_open(path, "pt") as file:
-                said = json.loads((file.metadata() or {}).get(FORMAT, "null"))
-                weights = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118
-        except (OSError, SafetensorError, ValueError) as error:
-            raise HandrailError(f"encoder {str(path)!r}: {message_of(error)}") from error
-        return cls.of(said, weights, f"encoder {str(path)!r}")
+        where = f"encoder {str(path)!r}"
+        with restated(where, (OSError, SafetensorError, ValueError)), safe_open(path, "pt") as file:
+            said = json.loads((file.metadata() or {}).get(FORMAT, "null"))
+            weights = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118
+        return cls.of(said, weights, where)
 
     @classmethod
     def of(cls, reads: object, weights: Mapping[str, Tensor], where: str) -> "Encoder":
         """Return an encoder from what its file has."""
         encoder = cls(decoded(reads, Reads, where))
-        try:
+        with restated(where, (RuntimeError, ValueError, AttributeError)):
             encoder.network.load_state_dict(dict(weights), strict=True)
-        except (RuntimeError, ValueError, AttributeError) as error:
-            raise HandrailError(f"{where}: {message_of(error)}") from error
         if not all(values.isfinite().all() for values in encoder.network.state_dict().values()):
             raise HandrailError(f"{where}: expected finite weights, got NaN or infinity")
         return encoder

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from lerobot.processor import NormalizerProcessorStep, UnnormalizerProcessorStep
 from safetensors.torch import load_model
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.datasets.recording.frames import PICTURE
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.encoder import Encoder
@@ -71,13 +71,13 @@ class TrainedPolicy:
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
             batch[PICTURE + camera] = pixels[None].float() / 255.0
         batch["task"] = [task]
-        with self._explained(), torch.inference_mode():
+        with self._restated(), torch.inference_mode():
             return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
 
     def planned(self) -> FloatArray:
         """Return the actions that are planned beyond the last one, (K, a) float32; none of other kinds."""
         rows = list(self._queue)
-        with self._explained(), torch.inference_mode():
+        with self._restated(), torch.inference_mode():
             return self.after(torch.cat(rows)).cpu().numpy() if rows else np.zeros((0, 0), np.float32)
 
     def skip(self, count: int) -> None:
@@ -87,13 +87,8 @@ class TrainedPolicy:
         for _ in range(min(count, len(self._queue))):
             self._queue.popleft()
 
-    @contextmanager
-    def _explained(self) -> Iterator[None]:
-        try:
-            yield
-        except Exception as error:  # of LeRobot and all below it
-            kind = self.policy.config.type
-            raise HandrailError(f"policy {kind}: cannot act: {message_of(error)}") from error
+    def _restated(self) -> AbstractContextManager[None]:
+        return restated(f"policy {self.policy.config.type}: cannot act")  # of LeRobot and all below it
 
     @property
     def _queue(self) -> deque[Any]:
@@ -113,12 +108,10 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
     kind, override = settings.pop("type"), {"device_processor": {"device": "cpu"}}
     if _FETCHED in settings:  # PyTorch would fetch these first; the checkpoint has others
         settings[_FETCHED] = None
-    try:
+    with restated(f"policy {str(place)!r}"):  # LeRobot's and all below it: what the files hold is refused
         config = draccus.decode(registered_policies()[kind], settings | {"device": "cpu"})
         policy = get_policy_class(kind).from_pretrained(place, config=config, strict=True)
         around = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
-    except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
-        raise HandrailError(f"policy {str(place)!r}: {message_of(error)}") from error
     check_numbers(policy, around, place)
     before, after = map(without_steps, around)  # an operator sees and acts through the interface itself
     policy.eval()
@@ -136,10 +129,8 @@ def repeatable(seed: int) -> Iterator[None]:
 
 def load_weights(policy: torch.nn.Module, place: Path) -> None:
     """Load the weights of a checkpoint into a policy: all there, none of another."""
-    try:
+    with restated(f"policy {str(place)!r}"):  # PyTorch's and safetensors': whatever the file holds is refused
         load_model(policy, place / WEIGHTS, strict=True)
-    except Exception as error:  # of PyTorch and safetensors: whatever the file holds, it is refused
-        raise HandrailError(f"policy {str(place)!r}: {message_of(error)}") from error
 
 
 def check_numbers(policy: torch.nn.Module, pipelines: tuple[Any, ...], place: Path) -> None:

@@ -18,7 +18,7 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError, shown, unknown_name
 from handrail.controllers.regular_file import is_inside, regular
-from handrail.datasets.storage.atomic import reason
+from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.strict_json import load_json
 
 CONFIG, WEIGHTS = "config.json", "model.safetensors"
@@ -39,11 +39,9 @@ def check_links(folder: Path) -> None:
         if not is_inside(path, folder):
             words = "expected a file in the folder, found a link out of it; copy it with cp -rL"
             raise HandrailError(f"{str(path)!r}: {words}")
-        try:
+        with explained(repr(str(path))):
             if not path.is_dir():
                 regular(path)
-        except OSError as error:
-            raise HandrailError(f"{str(path)!r}: {reason(error)}") from error
 
 
 def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, Any]:

@@ -41,20 +41,9 @@ class MemoryMeta:
     robot_type: str = ""
 
     @property
-    def episodes(self) -> dict[str, list[int]]:
-        """Where each episode begins and ends."""
-        ends = np.cumsum(self.lengths).tolist()
-        return {"dataset_from_index": [0, *ends[:-1]], "dataset_to_index": ends}
-
-    @property
     def camera_keys(self) -> list[str]:
         """Keys of pictures."""
         return [key for key, feature in self.features.items() if feature["dtype"] in PICTURES]
-
-    @property
-    def depth_keys(self) -> list[str]:
-        """Keys of pictures of distances: none."""
-        return []
 
 
 @dataclass(frozen=True)

@@ -147,10 +147,8 @@ def run_case(
     finally:
         env.close()
     states, collision = observer.states, CollisionModel(mpc.model, case.scene.obstacles())
-    q, tools = (
-        np.array([state.q for state in states]),
-        [hand.named("tool") for hand in mpc.model.description.hands],
-    )
+    q = np.array([state.q for state in states])
+    tools = [hand.named("tool") for hand in mpc.model.description.hands]
     return CaseTrace(
         case=case,
         times=np.array([state.time for state in states]),

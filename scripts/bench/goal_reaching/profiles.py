@@ -7,8 +7,6 @@ from scipy.signal import lfilter
 
 from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.errors import unknown_name
-from handrail.scripts.bench.goal_reaching.config import PROFILES
 
 SPEEDS = {"fast15": 1.5, "fast2": 2.0, "fast3": 3.0}
 NOTHING_YET = -1
@@ -37,12 +35,10 @@ def profile_commands(profile: str, planner: StraightPlanner, rng: np.random.Gene
     """Return a profile's commands; each keeps the planned displacement, so that a perfect robot arrives.
 
     Args:
-        profile: one of `PROFILES`.
+        profile: one of `PROFILES` of the settings, which refuse others.
         planner: at the profile's speed, `SPEEDS`.
         rng: of noise, delays and dropouts.
     """
-    if profile not in PROFILES:
-        raise unknown_name("profile", profile, PROFILES)
     now, rates = np.arange(T_MAX), np.ones(T_MAX)
     delivered = now
     if profile == "steps":

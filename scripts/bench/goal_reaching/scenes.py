@@ -50,13 +50,9 @@ def cluttered_floor(model: RobotModel, goal: Pose, rng: np.random.Generator) -> 
         for _ in range(_TRIES):
             x, y = rng.uniform(*_AREA)
             item = pillar(f"cylinder_{len(placed)}", x, y, radius, height)
-            way = _distance_to_line(item.position[:2], hand, goal.position[:2])
+            passes = not tall or _distance_to_line(item.position[:2], hand, goal.position[:2]) >= _CLEAR_HAND
             apart = all(_between(item, other) >= _CLEAR_EACH_OTHER for other in placed)
-            if (
-                (way >= _CLEAR_HAND or not tall)
-                and apart
-                and clearance(model, item.obstacle()) >= _CLEAR_START
-            ):
+            if passes and apart and clearance(model, item.obstacle()) >= _CLEAR_START:
                 placed.append(item)
                 break
         else:
