@@ -209,7 +209,7 @@ class HandrailSim(Uncalibrated, Robot):
         """Stop the robot and close its world."""
         self._check_connected()
         self._report()
-        self._connected = False
+        self._connected = self._driven = False
         self.env.plant.stop()
         self._open.close()
 
@@ -247,7 +247,8 @@ class HandrailSim(Uncalibrated, Robot):
         seen = tuple(map(lerobot_name, (*self.env.agent_names, *self.env.state_names)))
         grippers = (hand.named("gripper") for hand in self.env.model.description.hands)
         sent = (f"sent.{name}" for name in (*self.env.model.joints, *grippers))
-        return (*seen, *sent, *_TOLD) if self._config.diagnostics else seen
+        told = (f"{name}.number" if name in self.cameras else name for name in _TOLD)
+        return (*seen, *sent, *told) if self._config.diagnostics else seen
 
     def _numbers(self) -> dict[str, float]:
         """Return the robot, the scene, what was sent in the last period, and how the controller fared.

@@ -16,6 +16,7 @@ from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
 _LEAD = 0.2  # how far a joint's target may be ahead of where the joint is [rad, m]
+_LONGEST = 0.1  # for which a target goes on at once, where commands come late [s]
 _HOLD = 0.5  # for how long a base may go on as it was sent: LeKiwi's watchdog [s]
 _SILENT = 2.5  # periods without an observation, after which velocities say nothing of the way
 _PUSHED = 4.0  # a base goes no faster, as a share of its limit: people push robots
@@ -39,7 +40,8 @@ class WholeBody:
     """Knows where a robot is, and what it was sent.
 
     A joint that takes positions is sent the path of its velocity, `r⁺ = r + ½ h (v + v⁺)`: on from the target
-    before, not from where it is, so that a joint that sags under its weight sags no further. It goes no
+    before, not from where it is, so that a joint that sags under its weight sags no further. h is the time
+    since the command before, so that the arm keeps pace with a base in a slow loop. The target goes no
     farther ahead of the joint than 0.2 rad; where it would, the whole arm slows down and stays on its path.
     Whatever is measured, a target moves no faster than its joint may: `|r⁺ − r| ≤ h v_max`.
 
@@ -153,7 +155,8 @@ class WholeBody:
             self._gate.velocity[b:][self._units.sends_position] = 0.0
         before = self._gate.velocity
         self.sent = self._gate.limit(command, np.append(base[:b], self.targets))
-        way = 0.5 * self._period * (before + self._gate.velocity)[b:]
+        since = min(passed, _LONGEST) if 0.0 < passed <= self._timeout else self._period
+        way = 0.5 * since * (before + self._gate.velocity)[b:]
         arm = self._reading.arm
         most = np.where(way > 0.0, arm + _LEAD - self.targets, self.targets - arm + _LEAD)
         share = np.min(most / np.maximum(np.abs(way), 1e-12), initial=1.0)  # all slow down: the path stays

@@ -42,6 +42,8 @@ class Perturbation:
     def __post_init__(self) -> None:
         """Check the sizes."""
         check_settings(self, "--perturbation")
+        if self.blank and self.swap:
+            raise HandrailError("--perturbation: expected blank or swap, got both")
 
     @classmethod
     def parse(cls, text: str) -> "Perturbation":

@@ -171,15 +171,15 @@ class Simulation(Plant):
 
         Args:
             base: on the base's centre of mass, in the world, (3,) [N].
-            hand: at every tool point, in the world, (3,) [N].
+            hand: at the tool point of the hand that does the task, in the world, (3,) [N].
         """
         data = self.data
         data.xfrc_applied[:] = 0.0
         data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
-        for tool in self._tools:
-            carrier = self.mujoco_model.site_bodyid[tool]
-            lever = data.site_xpos[tool] - data.xipos[carrier]
-            data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
+        tool = self._tools[self._model.number]
+        carrier = self.mujoco_model.site_bodyid[tool]
+        lever = data.site_xpos[tool] - data.xipos[carrier]
+        data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
     def _move_obstacles(self) -> None:
         """Put what moves by itself where it is now."""

@@ -136,6 +136,8 @@ class Task(ABC):
     time_limit: float  # time after which an episode is given up [s]
     stages: ClassVar[tuple[str, ...]] = ()
     """Names of the stages in which it is done, one after the other, if it has any."""
+    parts: ClassVar[Mapping[str, str]] = {}
+    """What has a place in the state and is a part of an object: by its name, the object's."""
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """The controllers that a teleop mode can choose from; light to import."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from handrail.controllers.registry import Registry, resolved
@@ -18,6 +18,8 @@ class ControllerSpec:
     fits: Callable[[Any], bool] = lambda robot: True  # whether it can drive a robot, by its description
     objectives: bool = False
     """Whether `build` also takes what robot and task bring, `(model, period, objectives)`."""
+    aims: bool = False
+    """Whether it needs the place that the hand is to be brought to."""
 
 
 def _mpc(name: str, kind: str, help: str, **settings: float) -> ControllerSpec:
@@ -40,15 +42,10 @@ CONTROLLERS = Registry(
     ControllerSpec,
     (
         _mpc("mpc", "masked_mpc:MaskedMpc", "the masked MPC"),
-        _mpc(
-            "blended", "blended:BlendedMpc", "the masked MPC of an operator and an actor that knows the goal"
+        replace(
+            _mpc("blended", "blended:BlendedMpc", "the masked MPC of an operator and an actor"), aims=True
         ),
-        _mpc(
-            "mpc_one_stage",
-            "masked_mpc:MaskedMpc",
-            "the masked MPC without its horizon: one stage",
-            horizon=1,
-        ),
+        _mpc("mpc_one_stage", "masked_mpc:MaskedMpc", "the masked MPC of one stage, no horizon", horizon=1),
         ControllerSpec("direct", f"{_HERE}.baselines.direct:DirectController", "clipped to joint limits"),
         ControllerSpec(
             "dls",

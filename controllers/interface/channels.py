@@ -134,6 +134,10 @@ class Channels:
             mask |= [channel in chosen for channel in self.names]
         return mask
 
+    def arm(self, hand: int) -> BoolArray:
+        """Return the mask of the joints of a hand's own arm, (m,)."""
+        return self.mask(f"{_kind(self.hands[hand][0])}.arm" if len(self.hands) > 1 else "arm")
+
     def have(self, *names: str) -> bool:
         """Whether the robot has some channels, by name or by group."""
         found = [self._groups.get(name, (name,)) for name in names]

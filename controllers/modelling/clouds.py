@@ -51,7 +51,7 @@ def body_frame(model: pin.Model, link: str) -> pin.Frame:
 
 def hull(points: FloatArray) -> FloatArray:
     """Return the corners of the convex hull of points, (k, 3); of flat ones too."""
-    return points[ConvexHull(points, qhull_options="QJ Pp").vertices]
+    return points if len(points) < 4 else points[ConvexHull(points, qhull_options="QJ Pp").vertices]
 
 
 def geometry_models(arm: Arm) -> tuple[pin.GeometryModel, pin.GeometryModel]:

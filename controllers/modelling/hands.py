@@ -15,6 +15,8 @@ _NEAR = 0.01  # of a hand's frame to its joint, where that does not say which wa
 _ROLLS = 0.3  # least share of that way along the axis of a joint by which the hand rolls
 _PAD = 0.35  # of a finger, from its tip to where it holds a thing
 _END = 0.02  # of a finger: its last part [m]
+_LEAST = 1e-3  # by which fingers move apart [m]
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of a finger's way, at which it is looked at
 _AIR = 0.003  # of the box around the fingers [m]
 
 
@@ -29,7 +31,7 @@ class HandFinder:
     def __init__(self, arm: Arm, moving: Sequence[str]) -> None:
         self.model = read_urdf(arm, mimic=True)
         collision, visual = urdf_clouds(arm.urdf, arm.mesh_root, arm.prefix)
-        self._links, self._moving = list((collision or visual).values()), set(moving)
+        self._links, self._moving = list((visual | collision).values()), set(moving)
 
     def fingers(self, frame: str) -> list[set[int]]:
         """Return the joints of each finger: those that a joint carries on the body of a hand's frame."""
@@ -58,14 +60,15 @@ class HandFinder:
         z, x = np.eye(3)[axis] * np.sign(along[axis]), np.eye(3)[(axis + 1) % 3]
         return np.column_stack([x, np.cross(z, x), z])
 
-    def finger_clouds(self, frame: str, far: bool) -> list[list[LinkCloud]]:
-        """Return what each finger fills in a hand's frame, its joints nearest to zero or farthest."""
+    def finger_clouds(self, frame: str, share: float) -> list[list[LinkCloud]]:
+        """Return what each finger fills in a hand's frame, joints from nearest to 0 to farthest."""
         model, data, q = self.model, self.model.createData(), pin.neutral(self.model)
         ends = np.sort([model.lowerPositionLimit, model.upperPositionLimit], axis=0)
         farther = np.abs(ends).argmax(axis=0)
         joints = zip(list(model.names)[1:], model.joints[1:], strict=True)
         free = [joint.idx_q for name, joint in joints if name not in self._moving]
-        q[free] = ends[farther if far else 1 - farther, np.arange(model.nq)][free]
+        near, far = (ends[end, np.arange(model.nq)][free] for end in (1 - farther, farther))
+        q[free] = near + share * (far - near)
         pin.framesForwardKinematics(model, data, q)
         hand = data.oMf[model.getFrameId(frame, pin.FrameType.BODY)].inverse()
         fingers = [[link for link in self._links if link.joint in each] for each in self.fingers(frame)]
@@ -76,23 +79,26 @@ class HandFinder:
 
         Two fingers slide, or turn by as much as their tips move apart; None where there are not two.
         """
-        ends = [[_points(finger) for finger in self.finger_clouds(frame, end)] for end in (False, True)]
+        way = [[_points(finger) for finger in self.finger_clouds(frame, share)] for share in SHARES]
+        ends = [way[0], way[-1]]
         if len(ends[0]) != 2:
             return None
         across = np.eye(3) - np.outer(axes[:, 2], axes[:, 2])
         ends.sort(key=lambda each: np.linalg.norm(across @ (_tip(each[1], axes) - _tip(each[0], axes))))
         shut, apart = (across @ (_tip(right, axes) - _tip(left, axes)) for left, right in ends)
+        stroke = float(np.linalg.norm(apart) - np.linalg.norm(shut))
+        if not stroke > _LEAST:
+            return None
         x = apart / np.linalg.norm(apart)
         rotation = np.column_stack([x, np.cross(axes[:, 2], x), axes[:, 2]])
         left, right = (points @ rotation for points in ends[1])
-        both = np.vstack([points @ rotation for each in ends for points in each])
+        both = np.vstack([points @ rotation for each in way for points in each])
         lower, upper = both.min(axis=0) - _AIR, both.max(axis=0) + _AIR
         tip, root = upper[2] - _AIR, lower[2] + _AIR
         middle = (_tip(left, np.eye(3)) + _tip(right, np.eye(3)))[:2] / 2
         sides = [np.ptp(points[points[:, 2] > tip - _END], axis=0) for points in (left, right)]
         width, depth = np.clip(np.mean(sides, axis=0)[:2], (0.008, 0.008), (0.03, 0.04))
         size = np.array([width, depth, min(tip - root, 0.12)])
-        stroke = float(np.linalg.norm(apart) - np.linalg.norm(shut))
         around = np.array([stroke / 2 + width, depth / 2]) + _AIR
         lower[:2], upper[:2] = np.minimum(lower[:2], middle - around), np.maximum(upper[:2], middle + around)
         place = {"rpy": pin.rpy.matrixToRpy(rotation)}

@@ -36,6 +36,11 @@ def arm_limits(tables: dict[str, Any], model: RobotModel, rng: np.random.Generat
     ]
     velocity[odd] = np.where(slides, *_VELOCITY[::-1])[odd]
     most = np.where(slides, *_EFFORT[::-1])
+    said += [
+        f"effort of {model.joints[k]}: {most[k]:.6g}, the URDF says {effort[k]:.6g}"
+        for k in np.flatnonzero(~((effort > 0.0) & (effort <= most)))
+        if k >= base
+    ]
     effort = np.where(effort > 0.0, np.minimum(effort, most), most)
     inertia = _inertias(model, rng)
     servo = np.maximum(np.where(slides, 10.0, 5.0) * effort, inertia / _SERVO_TIME)

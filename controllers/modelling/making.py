@@ -1,5 +1,6 @@
 """A robot's description from its URDF: everything that it says, and what of that is a guess."""
 
+import itertools
 import tomllib
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +11,7 @@ import pinocchio as pin
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.modelling.clouds import LinkCloud, body_frame, hull, link_clouds
 from handrail.controllers.modelling.fitting import fitted, pieces
-from handrail.controllers.modelling.hands import HandFinder
+from handrail.controllers.modelling.hands import SHARES, HandFinder
 from handrail.controllers.modelling.home import find_home, reach_of
 from handrail.controllers.modelling.limits import LIMITS, arm_limits, base_limits
 from handrail.controllers.modelling.pairs import Meetings
@@ -102,7 +103,7 @@ class RobotMaker:
         axes = self._finder.axes(frame)
         ahead = int(np.argmax(np.abs(axes[:, 2])))
         way, fingers = "+−"[int(axes[ahead, 2] < 0.0)] + "xyz"[ahead], f"{name}_fingers".lstrip("_")
-        said = "no gripper, for it has not two fingers that move"
+        said = "no gripper, for it has not two fingers that move apart"
         hand["rpy"] = pin.rpy.matrixToRpy(axes)
         if found := self._finder.gripper(frame, axes):
             hand |= found[0]
@@ -120,20 +121,29 @@ class RobotMaker:
         held = {link.link for link in fingers}
         clouds = [cloud for cloud in link_clouds(model) if cloud.link not in held]
         parts: dict[str, tuple[str, FloatArray]] = {}
+        taken, links = {*(shape["name"] for shape in given), "floor"}, {cloud.link for cloud in clouds}
+
+        def cut(name: str, frame: str, pieces: list[FloatArray]) -> None:
+            """Let parts of a body have its name, and others like it that nothing else has."""
+            others = taken | (links | parts.keys()) - {name}
+            names = (f"{name}_{number}" if number > 1 else name for number in itertools.count(1))
+            free = (each for each in names if each not in others)
+            parts.update({next(free): (frame, piece) for piece in pieces})
+
         for joint in sorted({cloud.joint for cloud in clouds}):
             body = [cloud for cloud in clouds if cloud.joint == joint]
             link = max(body, key=lambda cloud: np.prod(np.ptp(cloud.triangles, axis=(0, 1)))).link
             own = [frame for frame in hands if body_frame(model.pinocchio, frame).parentJoint == joint]
             every = np.vstack([cloud.triangles for cloud in body])
-            parts |= _numbered(link, (own or [link])[0], pieces(every, _CUTS, _CUT, least))
+            cut(link, (own or [link])[0], pieces(every, _CUTS, _CUT, least))
         for _ in range(_ROUNDS):
             shapes = [_shape(model, name, *part) for name, part in parts.items()]
             self.tables["collision"] = given + shapes
             met = Meetings(self.model(), [*clouds, *fingers], _SAMPLES)
             if not (fat := self._choose_pairs(met)):
                 break
-            for name in fat & parts.keys():
-                parts |= _numbered(name, parts[name][0], pieces(parts[name][1], 1, np.inf, -np.inf))
+            for name in sorted(fat & parts.keys()):
+                cut(name, parts[name][0], pieces(parts[name][1], 1, np.inf, -np.inf))
         inside = [pair for pair, joints in zip(met.pairs, met.joints, strict=True) if joints in met.nested]
         if words := ", ".join(" – ".join(pair) for pair in inside):
             self.guesses.append(f"pairs left out, for their bodies are built into each other: {words}")
@@ -141,7 +151,7 @@ class RobotMaker:
     def _fingers(self, model: RobotModel, frame: str) -> list[LinkCloud]:
         """Return what the fingers of a hand fill, open and closed."""
         on = body_frame(model.pinocchio, frame)
-        both = [each for end in (False, True) for each in self._finder.finger_clouds(frame, end)]
+        both = [each for share in SHARES for each in self._finder.finger_clouds(frame, share)]
         return [link.moved(on.parentJoint, on.placement) for each in both for link in each]
 
     def _choose_pairs(self, met: Meetings) -> set[str]:
@@ -157,11 +167,6 @@ class RobotMaker:
                 fat |= set(pair) if overlap - touch > _FAT else set()
         self.tables["self_collision"]["pairs"] = pairs
         return fat
-
-
-def _numbered(name: str, frame: str, parts: list[FloatArray]) -> dict[str, tuple[str, FloatArray]]:
-    """Return parts of a body by their names, with the frame that shapes around them are on."""
-    return {f"{name}_{number}" if number > 1 else name: (frame, part) for number, part in enumerate(parts, 1)}
 
 
 def _shape(model: RobotModel, name: str, frame: str, triangles: FloatArray) -> dict[str, Any]:

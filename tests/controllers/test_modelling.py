@@ -1,6 +1,7 @@
 """A robot from a URDF: it can be used as it is, its shapes hold its links, and what is wrong is said."""
 
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.modelling.checks import faults
-from handrail.controllers.modelling.clouds import link_clouds
+from handrail.controllers.modelling.clouds import hull, link_clouds
 from handrail.controllers.modelling.home import freedom
 from handrail.controllers.modelling.making import RobotMaker
 from handrail.controllers.modelling.pairs import outside
@@ -218,3 +219,69 @@ def test_pinocchio_agrees_on_where_the_hands_are(made, tmp_path):
     np.testing.assert_allclose(
         made.model().pose(np.zeros(made.model().size), "left_tip").position, tip, atol=1e-6
     )
+
+
+def one_arm(
+    names: Sequence[str], bodies: Mapping[int, str], effort: str = 'effort="50"', hand: str = ""
+) -> str:
+    """Return the URDF of an arm of six joints on its base, some of its links with bodies of their own."""
+    parts, away = [link(names[0], "0.12 0.12 0.1", "0 0 0.05")], "0 0 0.15"
+    for number, axis in enumerate(AXES):
+        name, long = names[number + 1], 0.3 if number in (1, 2) else 0.1
+        plain = link(name, f"{long} 0.06 0.06", f"{long / 2} 0 0")
+        before, mark, own = plain.partition("<collision>")
+        parts.append(before + (bodies[number] + "</link>" if number in bodies else mark + own))
+        parts.append(joint(f"j{number}", names[number], name, away, axis).replace('effort="50"', effort))
+        away = f"{long + 0.02} 0 0"
+    tip = f'<parent link="{names[-1]}"/><child link="tip"/><origin xyz="0.12 0 0"/>'
+    end = f'<link name="tip"/><joint name="t" type="fixed">{tip}</joint>'
+    return f'<robot name="one">{"".join(parts)}{hand}{end}</robot>'
+
+
+def one_made(folder: Path, text: str) -> RobotMaker:
+    (folder / "one.urdf").write_text(text)
+    return RobotMaker(Source.find(str(folder / "one.urdf")), "one", {"": "tip"}, "planar").make()
+
+
+NAMES = ("base", "l1", "arm", "l3", "l4", "l5", "l6")
+TOWER = (
+    '<collision><origin xyz="0.6 0 0.25"/><geometry><box size="0.06 0.06 0.5"/></geometry></collision>'
+    '<collision><origin xyz="0.3 0 0"/><geometry><box size="0.6 0.06 0.06"/></geometry></collision>'
+)
+
+
+@pytest.mark.parametrize("word", ["arm_2", "chassis", "column", "floor"])
+def test_no_piece_of_a_body_takes_a_name_that_something_else_has(word, tmp_path):
+    names = [*NAMES[:3], word, *NAMES[4:]]
+    made = one_made(tmp_path, one_arm(names, {1: TOWER}))
+    model = made.model()
+    shapes = model.description.collision
+    assert len({shape.name for shape in shapes}) == len(shapes)
+    for cloud in link_clouds(model):
+        points = cloud.triangles.reshape(-1, 3)
+        own = [shape for shape in shapes if model.mount(shape)[0] == cloud.joint]
+        away = np.min([outside(model, shape, points) for shape in own], axis=0)
+        assert away.max() < 0.01, cloud.link
+
+
+@pytest.mark.parametrize(("said", "limit"), [("0", 400.0), ("50000", 400.0)])
+def test_an_effort_that_is_replaced_is_a_guess(said, limit, tmp_path):
+    made = one_made(tmp_path, one_arm(NAMES, {}, f'effort="{said}"'))
+    assert set(made.tables["limits"]["effort"][3:]) == {limit}
+    assert f"effort of j0: 400, the URDF says {said}" in made.guesses
+
+
+@pytest.mark.parametrize("y", [0.0, 0.02])
+def test_fingers_that_do_not_move_apart_are_no_gripper(y, tmp_path):
+    hand = "".join(
+        link(f"f{side}", "0.08 0.01 0.02", "0.04 0 0")
+        + joint(f"fj{side}", "l6", f"f{side}", f"0.12 {side * y} 0", "0 1 0", "prismatic")
+        for side in (0, 1)
+    )
+    made = one_made(tmp_path, one_arm(NAMES, {}, hand=hand))
+    assert "gripper" not in made.tables["hand"][0]
+    assert any("no gripper, for it has not two fingers that move apart" in guess for guess in made.guesses)
+
+
+def test_a_hull_of_few_points_is_these_points():
+    assert hull(np.eye(3)).tolist() == np.eye(3).tolist()

@@ -29,10 +29,10 @@ class PlainRobot:
     def observation(self) -> dict:
         return self.units.action(self.arm, np.zeros(len(self.arm)), self.twist, self.grips)
 
-    def send(self, action: dict) -> None:
+    def send(self, action: dict, period: float = PERIOD) -> None:
         reading = self.units.read(action)
         assert reading is not None, action
-        self.pose = moved(self.pose, 0.5 * (self.twist + reading.twist), PERIOD)
+        self.pose = moved(self.pose, 0.5 * (self.twist + reading.twist), period)
         self.arm, self.twist, self.grips = reading.arm, reading.twist, 1.0 - reading.openings
 
 
@@ -49,12 +49,12 @@ class Drive:
         self.pipeline = mpc_pipeline(self.step)
         self.sent: list[dict] = []
 
-    def go(self, action: dict, seconds: float = PERIOD) -> dict:
+    def go(self, action: dict, seconds: float = PERIOD, period: float = PERIOD) -> dict:
         """Ask for the same again and again; return what was sent last."""
-        for _ in range(round(seconds / PERIOD)):
+        for _ in range(round(seconds / period)):
             self.sent.append(self.pipeline((action, self.robot.observation())))
-            self.robot.send(self.sent[-1])
-            self.clock.now += PERIOD
+            self.robot.send(self.sent[-1], period)
+            self.clock.now += period
         return self.sent[-1]
 
     @property

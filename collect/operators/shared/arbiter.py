@@ -88,7 +88,7 @@ class Groups:
         if np.any(owned & base):
             lost |= base
         for hand in range(len(self.channels.hands)):
-            twist, arm = self.masks[self.hand(hand)], self._arm(hand)
+            twist, arm = self.masks[self.hand(hand)], self.channels.arm(hand)
             if np.any(owned & (twist | pair)) or np.all(owned[arm]):
                 lost |= twist | arm | pair
         return lost
@@ -96,12 +96,10 @@ class Groups:
     def grippers(self, owned: BoolArray) -> tuple[bool, ...]:
         """Return of which grippers an owner of channels has the hand, its pair, or a joint of its arm."""
         pair = self.masks["pair"]
-        arms = (self.masks[self.hand(n)] | self._arm(n) | pair for n in range(len(self.channels.hands)))
+        arms = (
+            self.masks[self.hand(n)] | self.channels.arm(n) | pair for n in range(len(self.channels.hands))
+        )
         return tuple(bool(np.any(owned & arm)) for arm in arms)
-
-    def _arm(self, hand: int) -> BoolArray:
-        alone = len(self.channels.hands) == 1
-        return self.channels.mask("arm" if alone else f"{self.hand(hand)}.arm")
 
 
 class Lately:

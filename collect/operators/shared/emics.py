@@ -26,6 +26,7 @@ from handrail.controllers.interface.sources import PERSON, POLICY
 _SLOW = 0.02  # ε: a policy that wishes for less has no goal-directed motion [m/s, rad/s]
 _FAST = 3.0  # a policy that wishes for more wishes for this [m/s, rad/s]
 _LONGEST = 0.1  # that a moment counts in a mean, after a pause too [s]
+_GONE = 1.0  # a policy that plans anew has no answer for a moment; after this it is gone [s]
 _STEADY = 0.5  # length of the mean command over the mean length, from which a person has a purpose
 
 
@@ -158,8 +159,8 @@ class LevelSwitcher:
 
     The person takes it by moving something, having moved nothing; so they take it back from the switcher by
     letting go and pushing again. Otherwise the first criterion that says who shall drive is followed, at
-    most once in `dwell`. Without a usable policy the person has it. While it is theirs and they move nothing,
-    nobody drives.
+    most once in `dwell`. Where the policy has had no usable answer for 1 s, the person has it. While it is
+    theirs and they move nothing, nobody drives.
 
     Args:
         groups: of the robot's channels.
@@ -178,6 +179,7 @@ class LevelSwitcher:
             part.reset()
         self._level, self._moving = POLICY, False
         self._since: float | None = None
+        self._usable: float | None = None  # when the policy had an answer last [s]
 
     def shares(self, wishes: Wishes) -> Shares:
         """Return 1 for whoever drives, 0 for the other."""
@@ -193,7 +195,9 @@ class LevelSwitcher:
         may = abs(wishes.time - since) >= self._dwell
         level = next(filter(None, wanted), self._level) if may else self._level
         before, self._moving = self._moving, bool(self._groups.moved(wishes.person).any())
-        if wishes.policy is None or (self._moving and not before):
+        if wishes.policy is not None or self._usable is None:
+            self._usable = wishes.time
+        if abs(wishes.time - self._usable) > _GONE or (self._moving and not before):
             level = PERSON
         self._since = since if level == self._level else wishes.time
         self._level = level

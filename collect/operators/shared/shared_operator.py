@@ -60,9 +60,7 @@ class SharedOperator:
         """Begin an episode."""
         self._person.reset(view, rng)
         self._policy.reset(view, rng.spawn(1)[0])  # what the person draws is as without a policy
-        self._arbiter.reset()
         self._find(view)
-        self._changed = [-np.inf] * self._hands  # when the person changed each [s]
         self._held = np.zeros(self._channels.size, dtype=bool)  # what the policy gave up, or shares
         self._waits = self._undone = False
 
@@ -90,7 +88,9 @@ class SharedOperator:
         return self._merged(person, *wanted, view)
 
     def _find(self, view: View) -> None:
-        """Take the grippers as they are."""
+        """Take the grippers as they are; nobody has taken anything yet."""
+        self._arbiter.reset()
+        self._changed = [-np.inf] * self._hands  # when the person changed each [s]
         self._closed = list(view.grippers or [0.0] * self._hands)  # how far each is asked to be closed
         self._level: tuple[float, ...] = ()  # of each as the person's device says
 

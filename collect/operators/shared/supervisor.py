@@ -26,7 +26,8 @@ class PolicySupervisor:
     """Knows what is to be done next; helps when the hand comes no nearer to it; an operator.
 
     With e the distance to the script's next target, it helps a moment after e has not fallen by 2 cm · scale
-    for 3 s, or has risen by 10 cm · scale; and lets go when that target is reached, for the next one.
+    for 3 s, or has risen by 10 cm · scale. Once it has helped for 1 s, it lets go when the target of that
+    moment is reached.
 
     Args:
         helper: what the person does where they steer.

@@ -1,6 +1,8 @@
 """Pull a drawer open by its handle: the cabinet and the task."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -90,6 +92,7 @@ class Drawer(Task):
 
     description: str = "Pull the drawer open by its handle."
     time_limit: float = 60.0  # [s]
+    parts: ClassVar[Mapping[str, str]] = {"handle": "drawer"}
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -88,6 +88,7 @@ class Drawn:
         env.reset(seed=0)
         turns = {item.name: item.turns for item in env.start.scene.objects if item.turns > 1}
         movable = tuple(item.name for item in env.start.scene.objects if item.movable)
+        movable += tuple(part for part, whole in env.task.parts.items() if whole in movable)
         known = {each.name: each for each in env.model.description.cameras}
         check_known("camera of the robot", names := self.config.session.camera_names, known)
         cameras = {name: CameraMount.of(known[name], env.model, env.image_size) for name in names}

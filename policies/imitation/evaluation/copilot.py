@@ -72,7 +72,7 @@ def _check_fits(checkpoint: Checkpoint, config: RecordConfig, env: HandrailEnv) 
         ("--task", meta.environment, config.task),
         ("--robot", meta.robot, config.robot),
         ("--robot_fps" if config.robot_fps else "--dataset.fps", meta.fps, env.fps),
-        ("--hand", meta.hand or env.model.hand.name, env.model.hand.name),
+        ("--hand", meta.hand or env.model.with_hand("").hand.name, env.model.hand.name),
         ("--moving_obstacles", checkpoint.movers, config.moving_obstacles),
     ):
         if own != here:

@@ -40,8 +40,8 @@ class RolloutProgress:
     """Watches a rollout: the furthest stage of the task that it came to, and whether it stood still.
 
     Attributes:
-        told: `distances` of the tool to where it is to go, one a second [m], and when it touched something
-            first, `first_contact` [s]; what there is.
+        told: `distances` of the tool to where it is to go, one a second [m], of several the nearest, or of
+            the middle between them; and when it touched something first, `first_contact` [s]; what there is.
     """
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
@@ -55,11 +55,15 @@ class RolloutProgress:
         """Look at the truth of this moment."""
         state, task = self._env.task_state(), self._env.task
         if self._frames % round(self._env.fps) == 0 and (aim := task.aim(state)):
-            self.told["distances"].append(round(float(np.linalg.norm(state.tool.position - aim.position)), 3))
+            places = [state.tool.position]
+            if len(state.tools) > 1:  # the hands do it in turn, or with it between them
+                places = [*(tool.position for tool in state.tools), state.pair.position]
+            least = np.linalg.norm(np.array(places) - aim.position, axis=1).min()
+            self.told["distances"].append(round(float(least), 3))
         if frame.contacts:
             self.told.setdefault("first_contact", round(self._frames / self._env.fps, 6))
         self._frames += 1
-        self._tools.append(state.tool.position)
+        self._tools.append(np.concatenate([tool.position for tool in state.tools]))
         if task.stages:
             self._stage = task.stages.index(task.stage(state))
             self._furthest = max(self._furthest, self._stage)
@@ -67,7 +71,7 @@ class RolloutProgress:
     def failed(self, outcome: Outcome) -> dict[str, str]:
         """Return of a failure the furthest `stage`, if the task has stages, and how it `ended`.
 
-        `dropped`: what it had in hand; `stalled`: the tool stayed within 5 cm for the last 5 s; `moving`.
+        `dropped`: what it had in hand; `stalled`: the tools stayed within 5 cm for the last 5 s; `moving`.
         """
         task = self._env.task
         named = {"stage": task.stages[self._furthest]} if task.stages else {}

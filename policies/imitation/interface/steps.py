@@ -23,6 +23,7 @@ from handrail.collect.session.build import build_controller
 from handrail.collect.world.observation import from_numbers
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
@@ -44,6 +45,7 @@ from handrail.policies.imitation.interface.encoder_step import (
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import ACT, COMPLETE, VIEW
 
+_UNEVEN = 0.01  # share of a period that one may be longer or shorter
 AROUND = tuple(f"observation.{name}" for name in ("time", "sent", "obstacles"))
 _views: "WeakValueDictionary[PolicyInterface, PolicyViewStep]" = WeakValueDictionary()
 """The step that sees, of the preprocessor loaded last: LeRobot loads those that act apart from it."""
@@ -79,6 +81,9 @@ class CompletedRobot:
             raise HandrailError(f"completion of intents: expected the channels of {by.robot}, got others")
         self._interface, self._by, self._n = interface, by, model.size
         self._tools = [hand.named("tool") for hand in model.description.hands]
+        if CONTROLLERS.find(MODES.find(by.mode).controller).aims:
+            words = "its controller needs the goal, which LeRobot shows it not; use handrail-evaluate"
+            raise HandrailError(f"completion of intents in mode {by.mode}: {words}")
         self._controller = build_controller(MODES.find(by.mode), model, by.fps, by.task)
         self._time, self._around = np.inf, b""
 
@@ -95,6 +100,9 @@ class CompletedRobot:
             around: the obstacles, as numbers.
         """
         now, n = float(time[0]), self._n
+        if now > self._time and abs((now - self._time) * self._by.fps - 1.0) > _UNEVEN:
+            words = f"expected {self._by.fps} actions a second (--env.fps={self._by.fps})"
+            raise HandrailError(f"{words}, as it was trained; got {1.0 / (now - self._time):.3g}")
         if now <= self._time:
             self._controller.reset(from_numbers(around, self._tools))
         elif around.tobytes() != self._around:
@@ -256,7 +264,7 @@ def with_steps(
     steps[first:first] = [*([encoder_step(encoder)] if encoder else []), view]
     act = PolicyActionStep(described)
     known = by.robot in ROBOTS and by.task in TASKS and by.mode in MODES and by.hand != MIXED
-    if interface.is_partial and known:
+    if interface.is_partial and known and not CONTROLLERS.find(MODES.find(by.mode).controller).aims:
         act = PolicyCompletionStep(described, {name: each for name, each in asdict(by).items() if each})
     return replace(before, steps=steps), replace(after, steps=[*after.steps, act])
 

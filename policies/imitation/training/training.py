@@ -15,7 +15,8 @@ from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_task
 from handrail.collect.session.recorded import COLUMN, recorded_settings
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, restated
+from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import decoded
 from handrail.controllers.versions import TRAINING, versions
 from handrail.datasets.storage.atomic import beside, remove
@@ -65,11 +66,15 @@ def train(config: TrainConfig) -> Path:
             with threads(config.threads), _quiet(config):
                 settings = _settings(config, steps)
                 assert settings.policy is not None
-                learnt, *out = (source.only(rows).dataset(settings.policy) for rows in source.split if rows)
+                learning, held_out = source.split
+                learnt, out = source.only(learning).dataset(settings.policy), None
+                if held_out:
+                    with restated(f"--eval_split, as --draw {config.draw} holds out", HandrailError):
+                        out = source.only(held_out).dataset(settings.policy)
                 training = TrainingRun(settings, learnt, checkpoint, weights, source.encoder)
                 for path in config.folder.glob("*") if config.overwrite and _MAIN else ():
                     remove(path)  # not before all else is sure
-                measured = out[0] if out else None, losses, config.eval_steps
+                measured = out, losses, config.eval_steps
                 training.train(lambda step: _meta(source, step, losses), *measured)
             checkpoint = last_checkpoint(config.folder)
         assert checkpoint is not None
@@ -131,7 +136,7 @@ def _is_checkpoint(path: Path) -> bool:
 def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> PolicyMeta:
     config, rows = source.config, source.selection.rows
     recorded = _recorded(rows)
-    hands = {each.hand for each in recorded}
+    hands = {hand_of(each) for each in recorded}
     return PolicyMeta(
         source.interface,
         *origin_of(source.info, rows),
@@ -152,6 +157,13 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> Po
         cameras=source.encoder.reads.pictures if source.encoder else {},
         validation={str(step): loss for step, loss in losses.items()},
     )
+
+
+def hand_of(config: SessionConfig) -> str:
+    """Return which hand did it; empty of a robot that has one, or that is not there."""
+    with suppress(HandrailError):
+        return config.hand or load_description(config.robot).hands[0].name
+    return ""
 
 
 def _recorded(rows: Sequence[Mapping[str, Any]]) -> list[SessionConfig]:

@@ -166,3 +166,22 @@ def test_a_teleoperator_needs_the_robot_that_it_steers(tmp_path):
 def test_a_wrong_setting_is_named(wrong, tmp_path):
     with pytest.raises(HandrailError, match=str(*wrong.values())):
         HandrailSim(HandrailSimConfig(calibration_dir=tmp_path, **wrong))
+
+
+@pytest.mark.needs_gl
+def test_a_camera_with_the_name_of_a_number_takes_none_away(tmp_path):
+    with steered(tmp_path, camera_names="wrist,scene", image_size="32") as (robot, _):
+        seen = robot.get_observation()
+        assert seen.keys() == robot.observation_features.keys()
+        assert {np.shape(seen[name]) for name in robot.cameras} == {(32, 32, 3)}
+        assert seen["scene.number"] == 0
+    with steered(tmp_path, camera_names="wrist", image_size="32") as (robot, _):
+        assert robot.get_observation()["scene"] == 0
+
+
+def test_a_scene_is_reported_once(tmp_path, caplog):
+    with steered(tmp_path) as (robot, teleop), caplog.at_level("INFO"):
+        loop(robot, teleop, 3)
+        robot.disconnect()
+        robot.connect()
+    assert sum("success" in record.message for record in caplog.records) == 1

@@ -1,5 +1,7 @@
 """Disturbances' laws: the seed alone decides, they matter, and without them nothing changes."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 from collect_helpers import Motionless, Watcher, action, environment
@@ -10,11 +12,14 @@ from handrail.collect.session.build import build_task
 from handrail.collect.session.disturbances import DelayedOperator, Pusher, sample_pushes, sample_shifted
 from handrail.collect.session.perturbations import DEFAULTS, Perturbation
 from handrail.collect.session.session import Session
+from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.robot import BASE_BODY
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.collect.world.tasks.reach import Reach
 from handrail.collect.world.tasks.tray import Tray
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.registry import fitting
@@ -24,9 +29,12 @@ MODEL = load_model()
 
 
 def test_written_values_are_read_back():
-    for text in ("none", "push:1", "push:2.5+shift:0.3+delay:4", "camera:2", "blank:1+swap:1"):
+    for text in ("none", "push:1", "push:2.5+shift:0.3+delay:4", "camera:2", "blank:1", "camera:1+swap:1"):
         assert Perturbation.parse(text).text == text
-    assert Perturbation.parse("push+shift+delay+camera+blank+swap").sizes == DEFAULTS
+    usual = {name: size for name, size in DEFAULTS.items() if name != "blank"}
+    assert Perturbation.parse("push+shift+delay+camera+swap").sizes == usual
+    with pytest.raises(HandrailError, match="expected blank or swap, got both"):
+        Perturbation.parse("blank+swap")
     assert Perturbation.parse(" push + delay:5 ").words == "pushed delayed:5"
     assert Perturbation.parse("camera").words == "camera moved"
     assert Perturbation.parse("none") == Perturbation()
@@ -141,3 +149,20 @@ def test_delayed_is_what_was_seen_k_periods_ago(periods):
             assert intent.time == views[-1].state.time
             env.step(action(env, 0.1))
     assert inner.seen == [views[max(0, step - periods)] for step in range(10)]
+
+
+def test_of_two_hands_the_one_that_does_the_task_is_pushed_by_its_own_arm_s_torque():
+    model = load_model("tiago_pro").with_hand("right")
+    pushed: dict[str, float] = {}
+    with closing(HandrailEnv(Reach(), model, fps=20)) as env:
+        env.reset(seed=0)
+        pusher, now = Pusher(1.0), env.simulation.data
+        pusher.begin(env, 0)
+        for now.time in np.arange(0.0, 15.0, 0.05):
+            pusher.act()
+            for body in np.flatnonzero(now.xfrc_applied.any(axis=1)):
+                force = float(np.linalg.norm(now.xfrc_applied[body, :3]))
+                pushed[env.simulation.mujoco_model.body(body).name] = force
+    (hand,) = (name for name in pushed if name != BASE_BODY)
+    assert "right" in hand
+    assert 10.0 < pushed[hand] < 30.0  # N; the torso, which lifts, would hold 2000

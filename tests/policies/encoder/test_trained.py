@@ -279,3 +279,11 @@ def test_an_encoder_that_is_there_is_never_replaced_unasked(tmp_path):
     assert settings.file.read_bytes() == kept
     train(dataclasses.replace(settings, overwrite=True, seed=1))
     assert settings.file.read_bytes() != kept
+
+
+@pytest.mark.parametrize(
+    ("task", "movable"), [("reach", ()), ("pick_place", ("cube",)), ("drawer", ("handle",))]
+)
+def test_what_moves_is_not_taken_for_standing(tmp_path, task, movable):
+    reads = Drawn(config(tmp_path, task=task)).reads
+    assert tuple(name for name, _, _ in reads.objects if name in reads.movable) == movable

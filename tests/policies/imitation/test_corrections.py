@@ -17,12 +17,13 @@ from training_helpers import cut, refused, tiny, weights
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.reading.reader import read_info
+from handrail.datasets.reading.reader import read_episodes, read_info
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.policies.imitation.interface.checkpoint import MODEL, last_checkpoint, read_meta
 from handrail.policies.imitation.training import run
 from handrail.policies.imitation.training.corrections import Draws
 from handrail.policies.imitation.training.presets import policy_config
+from handrail.policies.imitation.training.selection import hold_out
 from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train
 
@@ -232,3 +233,16 @@ def base_policy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("base") / "policy"
     train(tiny(canned(record_takeovers, 1, shared=False), folder))
     return folder
+
+
+def test_held_out_episodes_without_a_correction_are_named_as_such(takeovers, tmp_path):
+    plain = canned(record_takeovers, 6, shared=False)
+    ran(plain, takeovers, "--output", tmp_path / "both", name="merge")
+    rows = read_episodes(tmp_path / "both")
+    for draw in range(50):
+        config = tiny(
+            tmp_path / "both", tmp_path / "policy", corrections="weighted", eval_split=0.1, draw=draw
+        )
+        if max(row["episode_index"] for row in hold_out(rows, config)[1]) < 6:
+            break
+    refused(config, f"--eval_split, as --draw {draw} holds out: --corrections weighted: expected frames with")

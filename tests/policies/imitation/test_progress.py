@@ -1,5 +1,6 @@
 """Where a rollout failed: the furthest stage it came to, and how it ended."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -108,3 +109,16 @@ def test_the_distance_is_told_each_second_and_the_first_contact():
     np.testing.assert_allclose(told["distances"], expected, atol=5e-4)
     assert told["first_contact"] == 1.5
     assert watched([AWAY] * 200, Aimless(), contacts=(7,)) == {"distances": [], "first_contact": 0.35}
+
+
+def test_of_two_hands_the_nearest_counts_or_their_middle_and_both_have_to_stand():
+    def both(left, right):
+        tools = tuple(Pose(CUBE.position + way, np.eye(3)) for way in (left, right))
+        return replace(AWAY, tools=tools, openings=(1.0, 1.0))
+
+    aside = np.array([0.0, 0.3, 0.0])
+    told: Any = watched([both(UP, 0.2 * UP)] * 20 + [both(0.9 * aside, -aside)] * 20, contacts=(1,))
+    np.testing.assert_allclose(told["distances"], [0.2, 0.015], atol=5e-4)
+    moves = [both(UP, UP + 0.1 * (k % 2) * aside) for k in range(200)]
+    assert watched(moves)["ended"] == "stalled"
+    assert watched([both(UP, UP + (k % 2) * aside) for k in range(200)])["ended"] == "moving"

@@ -147,9 +147,9 @@ def test_a_training_that_goes_on_keeps_the_steps_and_adds_none(recorded, tmp_pat
         assert (gone_on / processor).read_bytes() == (begun / processor).read_bytes()
 
 
-def driven(interface, completes, seeds=(5,), fail_at=None):
+def driven(interface, completes, seeds=(5,), fail_at=None, by=BY):
     """Return the robot's states while a policy asks for the same twist all the time."""
-    view, acts, completion = steps(interface)
+    view, acts, completion = steps(interface, by)
     config = make_env_config("handrail", task=BY.task, mode="ee")  # LeRobot takes the policy's size from it
     env = make_env(config, n_envs=len(seeds), use_async_envs=False)["handrail"][0]
     assert isinstance(env, SyncVectorEnv)
@@ -255,3 +255,14 @@ def test_a_name_that_would_be_imported_is_refused_and_never_written(field, inter
     for by, kind in ((strange, PolicyActionStep), (BY, PolicyCompletionStep)):
         _, after = with_steps(pipeline, pipeline, interface, by)
         assert [type(step) for step in after.steps] == [kind]
+
+
+def test_another_rate_and_a_controller_that_needs_the_goal_are_refused(interface):
+    with pytest.raises(HandrailError, match=r"expected 10 actions a second \(--env\.fps=10\), .*; got 20"):
+        driven(interface, completes=True, by=dataclasses.replace(BY, fps=10))
+    with pytest.raises(HandrailError, match="in mode blended: its controller needs the goal"):
+        driven(interface, completes=True, by=dataclasses.replace(BY, mode="blended"))
+    plain = PolicyProcessorPipeline(steps=[], name="plain")
+    for mode, step in (("ee", PolicyCompletionStep), ("blended", PolicyActionStep)):
+        _, after = with_steps(plain, plain, interface, dataclasses.replace(BY, mode=mode))
+        assert type(after.steps[-1]) is step

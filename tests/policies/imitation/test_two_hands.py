@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from handrail.collect.config import SessionConfig
 from handrail.collect.world.observation import to_numbers
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
@@ -13,6 +14,7 @@ from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.checkpoint import MIXED, PolicyMeta, read_meta, write_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import CompletedRobot, Completion
+from handrail.policies.imitation.training.training import hand_of
 
 TIAGO = load_description("tiago_pro")
 CHANNELS, JOINTS, N = Channels.of(TIAGO), TIAGO.joints, len(TIAGO.joints)
@@ -148,3 +150,10 @@ def test_intents_of_the_second_hand_are_completed_with_what_it_holds():
     right, left = (np.array(moves) for moves in model.description.moves[::-1])
     assert np.abs(velocities[:n][right]).max() > 1e-3
     assert np.abs(velocities[:n][left & ~right]).max() < np.abs(velocities[:n][right & ~left]).max()
+
+
+def test_a_hand_that_was_not_said_is_the_first_one():
+    """So that demonstrations with and without `--hand left` are of one hand."""
+    said = [SessionConfig(robot="tiago_pro", hand=hand) for hand in ("", *HANDS)]
+    assert [hand_of(config) for config in said] == ["left", *HANDS]
+    assert hand_of(SessionConfig()) == hand_of(SessionConfig(robot="gone.toml")) == ""

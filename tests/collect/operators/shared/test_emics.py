@@ -120,8 +120,21 @@ def test_a_measurement_that_is_no_number_is_forgotten(name):
 def test_without_a_usable_policy_the_person_drives_whoever_did(name):
     course = Course(arbiter(name))
     swayed(course, 4.0)
-    assert drives(course.go(PUSHES, None)) == "person"
+    assert drives(course.go(PUSHES, None, 1.1)) == "person"
     assert drives(course.go(RESTS, None, 5.0)) == "nobody"
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_a_policy_that_plans_anew_for_a_moment_has_the_robot_still(name):
+    """As one beside the loop does at first, and whenever it gets the robot back."""
+    course = Course(arbiter(name))
+    course.go(RESTS, None, 0.1)
+    assert drives(course.go(RESTS, POLICY)) == "policy"
+    course.go(PUSHES, POLICY, 4.0)
+    while drives(course.go(RESTS, POLICY)) != "policy":
+        assert course.time < 20.0
+    course.go(RESTS, None, 0.1)
+    assert drives(course.go(RESTS, POLICY)) == "policy"
 
 
 @pytest.mark.parametrize(("name", "loses"), [("emics", True), ("hier_emics", False)])

@@ -248,3 +248,17 @@ def test_hand_overs_keep_the_limits_of_acceleration(name):
     assert np.max(np.abs(speeds) / limits.velocity) < 1.0 + 1e-6
     assert np.max(np.abs(speeds)) > 0.3, "a robot that freezes keeps limits too"
     assert {(), (PERSON,), (POLICY,)} <= owners
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_the_person_s_of_a_time_that_was_undone(name):
+    both = Both(name)
+    both.act(RESTS, DRIVES, 5.0)
+    both.act(PUSHES, seconds=1.0)
+    both.act(EpisodeEvent.PAUSE)
+    both.act(EpisodeEvent.UNDO)
+    both.time = 2.0
+    for _ in range(100):  # past the moment of the push
+        found = both.act(RESTS)
+        person = {each.name: each for each in found.sources}.get(PERSON)
+        assert person is None or not (person.share() > 0.0).any()
