@@ -290,15 +290,3 @@ def test_a_stranger_s_processor_imports_nothing(tmp_path):
         with pytest.raises(HandrailError, match=r"expected the step|may not choose what is imported"):
             load_pipeline(tmp_path, Clock())
     assert "antigravity" not in sys.modules
-
-
-@pytest.mark.parametrize("rate", [20.0, 15.0])
-def test_in_a_slow_loop_the_arm_keeps_pace_with_the_base(rate):
-    """The hand is asked to stand, while the base drives."""
-    drive = Drive(robot="lekiwi", units="lekiwi")
-    start = drive.hand
-    still = dict.fromkeys(("ee.vx", "ee.vy", "ee.vz"), 0.0)
-    drive.go({"base.vx": -0.03, **still}, 3.0, 1.0 / rate)
-    assert drive.robot.pose[0] < -0.07
-    assert np.linalg.norm(drive.hand - start) < 0.005
-    assert not drive.step.counts

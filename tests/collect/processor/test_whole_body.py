@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from processor_helpers import Drive
 
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
@@ -40,3 +41,13 @@ def test_a_base_is_expected_where_it_is_though_its_heading_wraps_or_its_place_is
     usual = driven(-0.5)
     np.testing.assert_allclose(driven(start, corrected), usual, atol=1e-6)
     assert np.abs(usual).max() < 0.1
+
+
+@pytest.mark.parametrize("rate", [20.0, 15.0])
+def test_in_a_slow_loop_the_arm_keeps_pace_with_the_base(rate):
+    drive = Drive(robot="lekiwi", units="lekiwi")
+    start = drive.hand  # is asked to stand
+    drive.go({"base.vx": -0.03, "ee.vx": 0.0, "ee.vy": 0.0, "ee.vz": 0.0}, 3.0, 1.0 / rate)
+    assert drive.robot.pose[0] < -0.07
+    assert np.linalg.norm(drive.hand - start) < 0.005
+    assert not drive.step.counts
