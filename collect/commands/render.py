@@ -98,9 +98,8 @@ def _which(
 ) -> list[tuple[Any, ...]]:
     """Return what tells episodes from others, also from those of the same seeds or with other looks."""
     names = ("seed", "started", "length")
-    return [
-        (*map(row.get, names), randomise or recorded_settings(row, config.said).randomise) for row in rows
-    ]
+    looks = [randomise or recorded_settings(row, config.said).randomise for row in rows]
+    return [(*map(row.get, names), look) for row, look in zip(rows, looks, strict=True)]
 
 
 def _manifest(config: RenderConfig, dataset: OpenDataset) -> Manifest:

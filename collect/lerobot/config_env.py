@@ -75,13 +75,8 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
         return self._session(mode=mode, mask=mask, time_limit=self.time_limit)
 
     @property
-    def package_name(self) -> str:
-        """The package that registers the environment."""
-        return "handrail.collect"
-
-    @property
     def gym_id(self) -> str:
-        """The environment: one for every task."""
+        """The environment, one for every task; `handrail.collect` has registered it."""
         return "handrail/LeRobot-v0"
 
     @property

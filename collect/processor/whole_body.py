@@ -196,9 +196,8 @@ class WholeBody:
         if before is not None:
             change = self._base - base
             change[2] = math.remainder(change[2], 2.0 * math.pi)  # a heading may begin anew at ±π
-            farthest = (
-                _passed(self._heard, now, math.inf) * self._model.description.limits.velocity[:3] + _LEAD
-            )
+            fastest, passed = self._model.description.limits.velocity[:3], _passed(self._heard, now, math.inf)
+            farthest = passed * fastest + _LEAD
             self._under_way -= np.where(np.abs(change) <= farthest, change, 0.0)  # else it was corrected
         self._reading = reading
         self._heard = now if math.isfinite(now) else self._heard

@@ -28,20 +28,16 @@ def arm_limits(tables: dict[str, Any], model: RobotModel, rng: np.random.Generat
     robot, base = model.pinocchio, len(model.description.base.joints)
     slides = np.array([joint.prismatic for joint in joints_of(model)], dtype=bool)
     velocity, effort = robot.velocityLimit.copy(), robot.effortLimit.copy()
-    odd = ~((velocity > 0.0) & (velocity <= np.where(slides, *FASTEST[::-1])))
-    said = [
-        f"velocity of {model.joints[k]}: {_VELOCITY[int(slides[k])]}, the URDF says {velocity[k]:.6g}"
-        for k in np.flatnonzero(odd)
-        if k >= base
-    ]
-    velocity[odd] = np.where(slides, *_VELOCITY[::-1])[odd]
-    most = np.where(slides, *_EFFORT[::-1])
-    said += [
-        f"effort of {model.joints[k]}: {most[k]:.6g}, the URDF says {effort[k]:.6g}"
-        for k in np.flatnonzero(~((effort > 0.0) & (effort <= most)))
-        if k >= base
-    ]
-    effort = np.where(effort > 0.0, np.minimum(effort, most), most)
+    said, kinds = [], (("velocity", velocity, FASTEST, _VELOCITY), ("effort", effort, _EFFORT, _EFFORT))
+    for name, values, most, instead in kinds:
+        odd = ~((values > 0.0) & (values <= np.where(slides, *most[::-1])))
+        guess = np.where(slides, *instead[::-1])
+        said += [
+            f"{name} of {model.joints[k]}: {guess[k]:.6g}, the URDF says {values[k]:.6g}"
+            for k in np.flatnonzero(odd)
+            if k >= base
+        ]
+        values[odd] = guess[odd]
     inertia = _inertias(model, rng)
     servo = np.maximum(np.where(slides, 10.0, 5.0) * effort, inertia / _SERVO_TIME)
     able = np.maximum(_SPARE * effort / (inertia + _DRIVE_TIME * servo), 0.2 * velocity)

@@ -147,6 +147,8 @@ class RobotMaker:
         inside = [pair for pair, joints in zip(met.pairs, met.joints, strict=True) if joints in met.nested]
         if words := ", ".join(" – ".join(pair) for pair in inside):
             self.guesses.append(f"pairs left out, for their bodies are built into each other: {words}")
+        if words := ", ".join(f"{' – '.join(pair)} ({share:.0%})" for pair, share in met.beside.items()):
+            self.guesses.append(f"neighbours that can touch, and nothing keeps them apart: {words}")
 
     def _fingers(self, model: RobotModel, frame: str) -> list[LinkCloud]:
         """Return what the fingers of a hand fill, open and closed."""

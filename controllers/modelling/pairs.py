@@ -31,6 +31,8 @@ class Meetings:
         count: of the random configurations.
 
     Attributes:
+        beside: share of the random configurations in which the meshes of neighbours touch, by the names of
+            their shapes; where that is less than half.
         pairs: names of the shapes, (P,) of (str, str).
         joints: numbers of the joints that carry them, (P,) of (int, int).
         q: configurations, (K, n).
@@ -53,14 +55,18 @@ class Meetings:
             self._meshes.addGeometryObject(pin.GeometryObject(placed.name, joint, *solid))
         names = [placed.name for placed in model.description.collision]
         joints = [each.parentJoint for each in self._shapes.geometryObjects]
-        self.pairs, self.joints = [], []
+        self.pairs, self.joints, neighbours = [], [], []
         for i, j in itertools.combinations(range(len(names)), 2):
             first, last = sorted((joints[i], joints[j]))
-            if first != last and self._model.parents[last] != first:
+            if first != last and self._model.parents[last] == first:
+                neighbours.append((i, j))
+            elif first != last:
                 for geometry in (self._shapes, self._meshes):
                     geometry.addCollisionPair(pin.CollisionPair(i, j))
                 self.pairs.append((names[i], names[j]))
                 self.joints.append((first, last))
+        for pair in neighbours:  # after the others, which have the same numbers in both
+            self._meshes.addCollisionPair(pin.CollisionPair(*pair))
         self._measured, self._touched = self._shapes.createData(), self._meshes.createData()
         self._shares: dict[int, float] = {}
         q = configurations(model, count, np.random.default_rng(0))
@@ -71,6 +77,13 @@ class Meetings:
         self.q = np.vstack([q, *nearer])
         self.distances = np.vstack([drawn, self._distances(self.q[count:])])
         often = np.flatnonzero(self.overlap > _NESTED)
+        rows, first = np.arange(0, count, _STRIDE), len(self.pairs)
+        shares = [self.touching(first + k, rows).mean() for k in range(len(neighbours))]
+        self.beside = {
+            (names[i], names[j]): share
+            for (i, j), share in zip(neighbours, shares, strict=True)
+            if 0.0 < share < _NESTED
+        }
         self.nested = {self.joints[index] for index in often if self.share(index) > _NESTED}
 
     def touching(self, index: int, rows: IntArray) -> BoolArray:

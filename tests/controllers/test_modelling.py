@@ -283,5 +283,13 @@ def test_fingers_that_do_not_move_apart_are_no_gripper(y, tmp_path):
     assert any("no gripper, for it has not two fingers that move apart" in guess for guess in made.guesses)
 
 
+def test_a_link_that_can_hit_the_one_that_carries_it_is_named(tmp_path):
+    post = '<collision><origin xyz="0 0 0.15"/><geometry><box size="0.06 0.06 0.3"/></geometry></collision>'
+    guesses = one_made(tmp_path, one_arm(NAMES, {0: post})).guesses
+    (said,) = (guess for guess in guesses if guess.startswith("neighbours that can touch"))
+    assert "l1 – arm (" in said
+    assert "l5 – l6" not in said  # which turn about the axis along them
+
+
 def test_a_hull_of_few_points_is_these_points():
     assert hull(np.eye(3)).tolist() == np.eye(3).tolist()

@@ -95,10 +95,8 @@ class Groups:
 
     def grippers(self, owned: BoolArray) -> tuple[bool, ...]:
         """Return of which grippers an owner of channels has the hand, its pair, or a joint of its arm."""
-        pair = self.masks["pair"]
-        arms = (
-            self.masks[self.hand(n)] | self.channels.arm(n) | pair for n in range(len(self.channels.hands))
-        )
+        pair, hands = self.masks["pair"], range(len(self.channels.hands))
+        arms = [self.masks[self.hand(hand)] | self.channels.arm(hand) | pair for hand in hands]
         return tuple(bool(np.any(owned & arm)) for arm in arms)
 
 
