@@ -34,7 +34,7 @@ def _listed(
     def checked(given: list[str]) -> Any:
         if given and (kind is str or split_list(given)):  # names of none are "", as by default
             return read(given)
-        raise ValueError(f"expected one {word} or more, got none")
+        raise ValueError("expected a list, got nothing")
 
     return PrimitiveConstructorSpec(
         "*", f"{word} [{word} …]", checked, lambda value: isinstance(value, kind), words

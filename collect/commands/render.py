@@ -59,8 +59,7 @@ def render(config: RenderConfig) -> None:
 
 def _render(config: RenderConfig) -> None:
     with open_dataset(config.root) as dataset:
-        recorded = [recorded_settings(row, config.said) for row in dataset.rows]
-        for settings in dict.fromkeys(recorded):
+        for settings in dict.fromkeys(recorded_settings(row, config.said) for row in dataset.rows):
             replace(settings, **config.seen).check()
         first, end = _begun(config, dataset), len(dataset.rows)
     folder = beside(config.target, "pictures")

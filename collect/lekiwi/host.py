@@ -79,8 +79,7 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> NoReturn:
     units = robot_units("lekiwi", model.description)
     expected = robot_units("lekiwi", load_description("lekiwi")).action_names
     if units.action_names != expected:
-        names = ", ".join(expected)
-        raise HandrailError(f"--robot {config.robot}: expected a LeKiwi (its action is {names}), got another")
+        raise HandrailError(f"--robot {config.robot}: expected a LeKiwi, with {', '.join(expected)}")
     task = resolved(TASKS.find(config.task).task)()
     render = "rgb_array" if config.cameras else None
     env = HandrailEnv(task, model, fps=_FPS, render_mode=render)

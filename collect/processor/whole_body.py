@@ -67,7 +67,9 @@ class WholeBody:
     ) -> None:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
         self._b = len(model.description.base.joints)
-        self._fastest = model.description.limits.velocity[self._b :]
+        limits = model.description.limits
+        self._fastest = limits.velocity[self._b :]
+        self._ends = limits.position_lower[self._b :], limits.position_upper[self._b :]
         grippers = [hand.gripper for hand in model.description.hands]
         strokes = [each.speed / each.stroke if each else _STROKES for each in grippers]
         self._grip_steps = period * np.array(strokes)
@@ -162,7 +164,9 @@ class WholeBody:
         share = np.min(most / np.maximum(np.abs(way), 1e-12), initial=1.0)  # all slow down: the path stays
         step = np.clip(self.targets + max(share, 0.0) * way, arm - _LEAD, arm + _LEAD) - self.targets
         farthest = self._fastest * max(self._period, passed)  # which may be NaN
-        self.targets = self.targets + np.clip(step, -farthest, farthest)
+        lower = np.minimum.reduce([self._ends[0], self.targets, arm])
+        upper = np.maximum.reduce([self._ends[1], self.targets, arm])
+        self.targets = np.clip(self.targets + np.clip(step, -farthest, farthest), lower, upper)
         self._held[b:] = share < 1.0
         self._twist = turned(self._gate.velocity[:3], -base[2]) if b else np.zeros(3)
         self._grips += np.clip(self._gate.grippers - self._grips, -self._grip_steps, self._grip_steps)

@@ -32,11 +32,8 @@ def arm_limits(tables: dict[str, Any], model: RobotModel, rng: np.random.Generat
     for name, values, most, instead in kinds:
         odd = ~((values > 0.0) & (values <= np.where(slides, *most[::-1])))
         guess = np.where(slides, *instead[::-1])
-        said += [
-            f"{name} of {model.joints[k]}: {guess[k]:.6g}, the URDF says {values[k]:.6g}"
-            for k in np.flatnonzero(odd)
-            if k >= base
-        ]
+        rows = [k for k in np.flatnonzero(odd) if k >= base]
+        said += [f"{name} of {model.joints[k]}: {guess[k]:.6g}, the URDF says {values[k]:.6g}" for k in rows]
         values[odd] = guess[odd]
     inertia = _inertias(model, rng)
     servo = np.maximum(np.where(slides, 10.0, 5.0) * effort, inertia / _SERVO_TIME)

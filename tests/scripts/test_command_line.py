@@ -129,7 +129,7 @@ def test_a_list_is_written_with_commas_or_spaces(name, flag, capsys):
     assert len(values) == 1, values
     with pytest.raises(SystemExit):  # as where a shell's variable is empty
         cli.parse(CONFIGS[name], name, [*needed, f"--{flag}"])
-    assert f"--{flag}: expected one " in capsys.readouterr().err
+    assert f"--{flag}: expected a list, got nothing" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("config", COMMAND_CONFIGS.values())

@@ -45,7 +45,7 @@ from handrail.policies.imitation.interface.encoder_step import (
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import ACT, COMPLETE, VIEW
 
-_UNEVEN = 0.01  # share of a period that one may be longer or shorter
+_UNEVEN = 0.01  # share of a period that one may be longer or shorter, beside what float32 rounds
 AROUND = tuple(f"observation.{name}" for name in ("time", "sent", "obstacles"))
 _views: "WeakValueDictionary[PolicyInterface, PolicyViewStep]" = WeakValueDictionary()
 """The step that sees, of the preprocessor loaded last: LeRobot loads those that act apart from it."""
@@ -100,7 +100,8 @@ class CompletedRobot:
             around: the obstacles, as numbers.
         """
         now, n = float(time[0]), self._n
-        if now > self._time and abs((now - self._time) * self._by.fps - 1.0) > _UNEVEN:
+        uneven = _UNEVEN + 2.0 * float(np.spacing(np.float32(now))) * self._by.fps
+        if now > self._time and abs((now - self._time) * self._by.fps - 1.0) > uneven:
             words = f"expected {self._by.fps} actions a second (--env.fps={self._by.fps})"
             raise HandrailError(f"{words}, as it was trained; got {1.0 / (now - self._time):.3g}")
         if now <= self._time:

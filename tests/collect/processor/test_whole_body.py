@@ -51,3 +51,10 @@ def test_in_a_slow_loop_the_arm_keeps_pace_with_the_base(rate):
     assert drive.robot.pose[0] < -0.07
     assert np.linalg.norm(drive.hand - start) < 0.005
     assert not drive.step.counts
+
+
+def test_in_a_slow_loop_no_joint_is_sent_past_its_range():
+    drive, joint = Drive(robot="lekiwi", units="lekiwi"), DESCRIPTION.arm_joints[0]
+    drive.go({f"joint.{joint}": 1.5}, 4.0, 1.0 / 15.0)
+    past = drive.robot.arm[0] - DESCRIPTION.limits.position_upper[3]
+    assert -0.05 < past < 0.002
