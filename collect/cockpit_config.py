@@ -1,13 +1,14 @@
 """Where the cockpit listens, as typed settings; light to import."""
 
 import ipaddress
+import ssl
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.typed import check_settings
 
 
@@ -53,7 +54,14 @@ class CockpitConfig:
                 ) from None
         check_settings(self, "--cockpit.")
         folder = Path(self.certificate).expanduser()
-        if self.certificate and not all((folder / name).is_file() for name in ("cert.pem", "key.pem")):
-            raise HandrailError(
-                f"--cockpit.certificate {self.certificate}: expected a folder with cert.pem and key.pem"
-            )
+        if self.certificate and (said := not_serving(folder / "cert.pem", folder / "key.pem")):
+            raise HandrailError(f"--cockpit.certificate {self.certificate}: {said}")
+
+
+def not_serving(cert: Path, key: Path) -> str:
+    """Return why a certificate and its key cannot serve; "" if they can."""
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(cert, key, password="")
+    except (OSError, ssl.SSLError) as error:
+        return f"expected in it cert.pem and its key.pem without a password; {message_of(error)}"
+    return ""

@@ -11,6 +11,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
+from handrail.collect.cockpit_config import not_serving
 from handrail.datasets.storage.atomic import explained
 
 LASTS = datetime.timedelta(days=365)
@@ -20,13 +21,13 @@ _ELSEWHERE = ("192.0.2.1", 9)  # an address for examples: asked for a way there,
 def certificate(host: str, folder: Path) -> tuple[Path, Path]:
     """Return the files in a folder of a certificate for an address, and of its key.
 
-    They are made now if there are none, they expire, this computer has another address by now, or others than
-    their owner can read the key.
+    They are made now if there are none, they expire or do not fit each other, this computer has another
+    address by now, or others than their owner can read the key.
     """
     cert, key = folder / f"{host}.pem", folder / f"{host}.key.pem"
     names = _names(host)
     is_secret = key.is_file() and not key.stat().st_mode & 0o077
-    if not (is_secret and _is_valid(cert, names)):
+    if not is_secret or not _is_valid(cert, names) or not_serving(cert, key):
         with explained(f"certificate in {folder}"):
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             _make(names, cert, key)

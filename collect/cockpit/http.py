@@ -1,42 +1,107 @@
-"""HTTP connections that do not stay open without asking for anything."""
+"""HTTP connections that do not stay open without asking for anything, nor too many of them."""
 
 import asyncio
+import contextlib
+import socket
+from collections.abc import Awaitable, Callable, Hashable
+from functools import partial
 from typing import ClassVar
 
+import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-_PATIENCE = 5.0  # until a request is whole [s]
-_MOST = 64  # connections that have not asked yet
+_PATIENCE = 5.0  # until TLS is agreed on, and then until a request is whole [s]
+_MOST, _MOST_ASKED = 64, 256  # connections that have not asked yet, and that have
+_FULL = 0.1  # before another connection is taken where this process has no room for one [s]
+
+
+class _Few:
+    """What waits, in order of coming; the oldest of too many is cut, and whatever waits too long."""
+
+    def __init__(self, most: int, patience: float | None = None) -> None:
+        self._most, self._patience = most, patience
+        self._all: dict[Hashable, tuple[Callable[[], object], asyncio.TimerHandle | None]] = {}
+
+    def add(self, waiting: Hashable, cut: Callable[[], object]) -> None:
+        late = self._patience and asyncio.get_running_loop().call_later(self._patience, cut)
+        self._all[waiting] = cut, late or None
+        if len(self._all) > self._most:
+            oldest = next(iter(self._all))
+            cut, _ = self._all[oldest]
+            self.remove(oldest)
+            cut()
+
+    def remove(self, waiting: Hashable) -> bool:
+        """Return whether it was there."""
+        _, late = found = self._all.pop(waiting, (None, None))
+        if late:
+            late.cancel()
+        return any(found)
 
 
 class Http(H11Protocol):
-    """A connection; cut if it does not ask within some seconds, or is the oldest of too many such ones."""
+    """A connection, until it is a page's socket."""
 
-    _silent: ClassVar[dict["Http", asyncio.TimerHandle]] = {}
+    _silent: ClassVar = _Few(_MOST, _PATIENCE)
+    _asked: ClassVar = _Few(_MOST_ASKED)
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Take note that it is open."""
         super().connection_made(transport)
-        self._silent[self] = self.loop.call_later(_PATIENCE, self._cut)
-        while len(self._silent) > _MOST:
-            next(iter(self._silent))._cut()
+        self._silent.add(self, transport.abort)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Take note that it is gone."""
-        self._heard()
+        self._forget()
         super().connection_lost(exc)
 
     def handle_events(self) -> None:
         """Take what has come; a whole request ends the wait."""
         super().handle_events()
-        if self.scope is not None or self not in self.connections:
-            self._heard()
+        if self not in self.connections:  # a page's socket by now, or gone
+            self._forget()
+        elif self.scope is not None and self._silent.remove(self):
+            self._asked.add(self, self.transport.abort)
 
-    def _heard(self) -> None:
-        timer = self._silent.pop(self, None)
-        if timer:
-            timer.cancel()
+    def _forget(self) -> None:
+        self._silent.remove(self)
+        self._asked.remove(self)
 
-    def _cut(self) -> None:
-        self._heard()
-        self.transport.abort()
+
+class Server(uvicorn.Server):
+    """Takes connections itself: asyncio would wait for TLS for a minute, with any number of strangers."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to take connections."""
+        await super().startup(sockets=[])
+        self._taking = [asyncio.create_task(self._take(each)) for each in sockets or ()]
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Take no more."""
+        for each in self._taking:
+            each.cancel()
+        await super().shutdown(sockets)
+
+    async def _take(self, listener: socket.socket) -> None:
+        loop, coming = asyncio.get_running_loop(), _Few(_MOST)
+        made = partial(Http, self.config, self.server_state, self.lifespan.state)
+        patience = _PATIENCE if self.config.ssl else None
+        listener.setblocking(False)
+        while True:
+            try:
+                each, _ = await loop.sock_accept(listener)
+            except OSError:
+                await asyncio.sleep(_FULL)
+                continue
+            agreed = loop.connect_accepted_socket(
+                made, each, ssl=self.config.ssl, ssl_handshake_timeout=patience
+            )
+            task = asyncio.create_task(_quietly(agreed))
+            coming.add(task, task.cancel)
+            task.add_done_callback(coming.remove)
+            await asyncio.sleep(0)  # many that wait do not hold up all else
+
+
+async def _quietly(agreed: Awaitable[object]) -> None:
+    with contextlib.suppress(OSError):
+        await agreed

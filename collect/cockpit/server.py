@@ -24,7 +24,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from handrail.collect.cockpit.guard import COOKIE, Guard
-from handrail.collect.cockpit.http import Http
+from handrail.collect.cockpit.http import Http, Server
 from handrail.collect.cockpit.hub import Hub
 from handrail.collect.cockpit.messages import LARGEST
 from handrail.collect.cockpit.pipe import Kind, Pipe
@@ -161,7 +161,7 @@ async def serve(pipe: Pipe, config: CockpitConfig, folder: Path, secret: str) ->
     listener = _listening(config.host, config.port)
     scheme = "http" if config.is_private else "https"
     guard, hub = Guard(not config.asks, scheme, secret), Hub(pipe)
-    server = uvicorn.Server(_uvicorn(Site(hub, guard, folder), config))
+    server = Server(_uvicorn(Site(hub, guard, folder), config))
     host, port = listener.getsockname()[:2]
     door = f"#{guard.token}" if config.asks else ""
     shown = f"[{host}]" if ":" in host else host

@@ -218,14 +218,15 @@ def read_urdf(arm: Arm, mimic: bool = False) -> pin.Model:
 
 
 def _arm(arm: Arm, robot: str) -> pin.Model:
-    """Return an arm with every joint that the description does not list locked at zero."""
-    model = read_urdf(arm)
+    """Return an arm with every other joint locked as near to 0 as its range allows."""
+    model = read_urdf(arm, mimic=True)
     if missing := sorted(set(arm.joints) - set(model.names)):
         raise unknown_name(f"arm joint of robot {robot}", missing[0], list(model.names)[1:])
     if led := [pair for pair in followers(arm) if set(pair) & set(arm.joints)]:
         raise HandrailError(f"arm joints of robot {robot}: expected no mimic, {' follows '.join(led[0])}")
     locked = [model.getJointId(name) for name in list(model.names)[1:] if name not in arm.joints]
-    reduced = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+    q = np.clip(pin.neutral(model), model.lowerPositionLimit, model.upperPositionLimit)
+    reduced = pin.buildReducedModel(model, locked, q) if locked else model
     if reduced.nq != reduced.nv or reduced.nv != len(arm.joints):
         raise HandrailError(f"arm of robot {robot}: expected revolute or prismatic joints in its URDF")
     return reduced

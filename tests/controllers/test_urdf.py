@@ -107,3 +107,18 @@ def test_a_hand_that_points_straight_up_has_a_camera(tmp_path):
     upright = re.sub(r'xyz="0 0.02 0.3" rpy="0.1 0 0.2"', 'xyz="0 0 0.3"', URDF)
     for camera in cameras(maker(tmp_path, upright).model()):
         assert np.isfinite(camera["position"]).all()
+
+
+def test_joints_that_stand_still_stand_where_they_can(tmp_path):
+    """Nearest to 0 in their range; followers where the URDF puts them for that."""
+    lift = JOINT % ("jled", "prismatic", "l6", "led", "0 0 1")
+    lift = lift.replace('lower="-1" upper="1.5"', 'lower="0.1" upper="0.4"')
+    behind = JOINT % ("jfollow", "prismatic", "led", "follow", "0 0 1")
+    behind = behind.replace("</joint>", '<mimic joint="jled" multiplier="-2" offset="0.03"/></joint>')
+    text = URDF.replace("</robot>", f"{LINK % 'led'}{lift}{LINK % 'follow'}{behind}</robot>")
+    model = maker(tmp_path, text).model().pinocchio
+    l6, led, follow = (model.frames[model.getFrameId(name)].placement for name in ("l6", "led", "follow"))
+    origin = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.0, 0.2), np.array([0.0, 0.02, 0.3]))
+    for on, out in ((l6.actInv(led), 0.1), (led.actInv(follow), 0.03 - 2.0 * 0.1)):
+        there = origin * pin.SE3(np.eye(3), np.array([0.0, 0.0, out]))
+        np.testing.assert_allclose(on.homogeneous, there.homogeneous, atol=1e-12)

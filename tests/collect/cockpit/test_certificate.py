@@ -8,6 +8,7 @@ from cryptography import x509
 
 from handrail.collect.cockpit import certificate as of_certificate
 from handrail.collect.cockpit.certificate import certificate
+from handrail.collect.cockpit_config import not_serving
 from handrail.controllers.errors import HandrailError
 
 HOST = "192.168.1.20"
@@ -38,6 +39,7 @@ SPOILT = {
         certificate("10.0.0.1", cert.parent)[0].read_bytes()
     ),
     "its key can be read by others": lambda cert, key: key.chmod(0o644),
+    "its key is another one's": lambda cert, key: certificate("10.0.0.9", cert.parent)[1].rename(key),
     "without its key": lambda cert, key: key.unlink(),
     "it expires": lambda cert, key: None,
 }
@@ -54,6 +56,7 @@ def test_one_that_does_not_hold_is_made_anew(tmp_path, monkeypatch, spoilt):
     certificate(HOST, tmp_path)
     assert addresses(cert) == [HOST]
     assert key.read_bytes() != before
+    assert not_serving(cert, key) == ""
     assert key.stat().st_mode & 0o777 == 0o600
     assert read(cert).not_valid_after_utc > datetime.datetime.now(datetime.UTC) + datetime.timedelta(days=300)
 

@@ -4,7 +4,6 @@ import json
 import socket as sockets
 import time
 from contextlib import ExitStack, suppress
-from urllib.parse import urlsplit
 
 import pytest
 from cockpit_helpers import ask, drive, heard, page, seen, server, show, stage, told
@@ -113,13 +112,6 @@ def test_a_copy_of_the_tab_takes_its_place(served):
         assert heard(served, {Kind.LOST})
         second.send(drive(1))
         assert heard(served, {Kind.DRIVE})
-
-
-@pytest.mark.slow
-def test_a_connection_that_asks_nothing_is_cut(served):
-    with sockets.create_connection(("127.0.0.1", urlsplit(served.address).port), timeout=30) as silent:
-        silent.send(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ")
-        assert silent.recv(100) == b""
 
 
 def test_too_large_a_message_ends_the_connection(served):
