@@ -180,11 +180,15 @@ def cautions(results: Results) -> dict[str, object]:
         if "digest_before" in progress.note(job).get("result", {}) and not job.policy
     ]
     missing, jobs = len(progress.missing), len(progress.jobs)
+    said = {
+        str(each) for job in progress.jobs if (each := progress.note(job).get("took", {}).get("versions"))
+    }
     return {
         _LIMITS: True,
         "One draw does not say how much another recording would differ.": design.draws < 2,
         f"{missing} of {jobs} jobs are not done yet: study.json names them.": missing,
         "The design was changed after the study began. Digests, in order:"
         f" {', '.join(seen)}; this report is of {design.digest}.": {*seen} - {design.digest},
+        "Jobs ran under other versions than others; the notes of the jobs say which.": len(said) > 1,
         f"Recorded again, and the rows were others than before: {', '.join(again)}.": again,
     }

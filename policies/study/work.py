@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.editing.merge import drop_episodes, merge_datasets
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.quality.measure import measure
@@ -78,6 +79,7 @@ def do(job: StudyJob, design: StudyDesign, root: Path) -> None:
         "seconds": round(time.monotonic() - start, 1),
         "processor_seconds": round(_processor_time() - spent, 1),
         "cores": os.cpu_count(),
+        "versions": versions(*SIMULATION, "torch"),
         "ended": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     write_json(layout.done(job), {"settings": fingerprint(job, design), "result": result, "took": took})

@@ -20,14 +20,16 @@ from handrail.datasets.statistics.replicates import (
     student,
     variance_of_share,
 )
+from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.study import tables
 from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, contrasts
 from handrail.policies.study.declared import declared
 from handrail.policies.study.design import DeclaredPair, Robustness
 from handrail.policies.study.figures import figures
 from handrail.policies.study.power import detectable, plan
+from handrail.policies.study.progress import StudyProgress
 from handrail.policies.study.report import answer, cautions
-from handrail.policies.study.results import MEASURES
+from handrail.policies.study.results import MEASURES, gather
 
 
 def shares_of(results, task, label):
@@ -261,3 +263,12 @@ def test_metrics_without_a_common_scale_are_left_to_compare(gathered):
     """Each recording is measured by itself: a share of its own largest command says nothing of others."""
     rows = tables.quality_table("reach", gathered()).rows
     assert [row[0] for row in rows] == ["episode length", "smoothness (SPARC)", "contacts", "interventions"]
+
+
+def test_jobs_that_ran_under_other_versions_are_said(gathered):
+    made = gathered().progress
+    for job, version, said in zip(made.jobs, ("4.0.0", "4.0.0", "4.0.1"), (0, 0, 1), strict=False):
+        note = made.note(job)
+        write_json(made.layout.done(job), note | {"took": note["took"] | {"versions": {"mujoco": version}}})
+        results = gather(StudyProgress(made.design, made.layout))
+        assert sum("other versions" in text for text, holds in cautions(results).items() if holds) == said
