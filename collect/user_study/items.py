@@ -27,6 +27,7 @@ class Item:
     step: int = 1  # between two places of a scale
     choices: tuple[tuple[str, str], ...] = ()  # answers, and how each is shown
     declines: bool = True  # whether one may prefer not to answer
+    longest: int = LONGEST_TEXT  # of a text
 
     def check(self, value: Any) -> Answer:
         """Return an answer, if it is one."""
@@ -46,14 +47,14 @@ class Item:
     def _is_clean(self, text: str) -> bool:
         """Return whether a text is not too long and can be written to any file."""
         kinds = {unicodedata.category(letter) for letter in text if letter != "\n"}
-        return len(text) <= LONGEST_TEXT and not kinds & {"Cc", "Cs"}
+        return len(text) <= self.longest and not kinds & {"Cc", "Cs"}
 
     @property
     def _expected(self) -> str:
         if self.choices:
             return f"one of {', '.join(choice for choice, _ in self.choices)}"
         if self.kind == "text":
-            return f"a text of at most {LONGEST_TEXT} characters"
+            return f"a text of at most {self.longest} characters"
         step = "" if self.kind == "number" else f" by {self.step}"
         return f"{self.least:g} to {self.most:g}{step}"
 

@@ -1,7 +1,11 @@
 """NASA-TLX and SUS equal what is computed by hand; what was not answered is never made up."""
 
+import re
+from dataclasses import fields
+
 import numpy as np
 import pytest
+from places import ROOT
 
 from handrail.collect.user_study.items import LONGEST_TEXT, Item
 from handrail.collect.user_study.questionnaires import (
@@ -111,3 +115,9 @@ def test_an_answer_that_is_none_is_refused_in_one_line(kind):
     assert ITEMS[kind].check(None) is None
     with pytest.raises(HandrailError):
         Item("consent", "choice", "?", choices=(("yes", ""), ("no", "")), declines=False).check(None)
+
+
+def test_the_page_reads_no_field_that_an_item_lacks():
+    page = (ROOT / "collect" / "cockpit" / "page" / "form.js").read_text()
+    read = set(re.findall(r"\bitem\.(\w+)", page)) - {"box"}  # which the page adds
+    assert {"kind", "longest"} <= read <= {field.name for field in fields(Item)}
