@@ -34,10 +34,11 @@ class Choices {
   }
 }
 
-// A field to type in; what does not fit is not sent, and says so.
+// A field to type in; a value that does not fit is not sent, and the page says so. It is open until a value fits.
 class Field {
   constructor(item, say) {
     this.item = item;
+    this.isOpen = false;
     this.input = document.createElement(item.kind === "text" ? "textarea" : "input");
     if (item.kind === "number") Object.assign(this.input, { type: "number", min: item.least, max: item.most, step: "any" });
     this.input.setAttribute("aria-label", item.text);
@@ -51,15 +52,19 @@ class Field {
 
   typed(patience = 400) {
     clearTimeout(this.timer);
+    this.isOpen = true;
+    this.say(undefined);
     this.timer = setTimeout(() => {
       const value = this.value();
-      this.wrong.textContent = value === undefined && this.input.value.trim() ? this.expected() : "";
-      if (value !== undefined) this.say(value);
+      this.isOpen = value === undefined;
+      this.wrong.textContent = this.isOpen && this.input.value.trim() ? this.expected() : "";
+      if (!this.isOpen) this.say(value);
     }, patience);
   }
 
   decline(value) {
     clearTimeout(this.timer);
+    this.isOpen = false;
     this.input.value = this.wrong.textContent = "";
     this.say(value);
   }
@@ -77,7 +82,7 @@ class Field {
   }
 
   set(value) {
-    if (value === undefined) return;
+    if (value === undefined || this.isOpen) return;
     this.declined?.set(value);
     if (document.activeElement !== this.input) this.input.value = value ?? "";
   }
@@ -102,12 +107,12 @@ function choice(item, say) {
 
 const KINDS = { scale, likert: scale, choice, pair: choice, number: (...all) => new Field(...all), text: (...all) => new Field(...all) };
 
-// Returns {box, set(value)}; say(value) is called with each answer, null for "prefer not to answer".
+// Returns {box, set(value), isOpen}; say(value) is called with each answer, null for "prefer not to answer", and with
+// undefined while one is typed.
 export function drawItem(item, say) {
   const box = make("fieldset", `item ${item.kind}-item`);
   box.dataset.item = item.name;
   box.append(make("legend", "", item.text || "Which one?"));
   if (item.help) box.append(make("p", "more", item.help));
-  const drawn = KINDS[item.kind]({ ...item, box }, say);
-  return { box, set: (value) => drawn.set(value) };
+  return Object.assign(KINDS[item.kind]({ ...item, box }, say), { box });
 }

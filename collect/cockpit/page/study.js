@@ -123,7 +123,7 @@ export class Study {
 
   answer(item, value) {
     this.pending.delete(item);
-    this.pending.set(item, value);
+    if (value !== undefined) this.pending.set(item, value);
     this.send();
     this.refresh();
   }
@@ -138,7 +138,7 @@ export class Study {
     if (!this.card?.id || this.card.last) return;
     const kept = this.card.answers;
     for (const [name, item] of this.items) item.set(this.pending.has(name) ? this.pending.get(name) : kept[name]);
-    const left = [...this.items.keys()].filter((name) => !(name in kept) && !this.pending.has(name)).length;
+    const left = [...this.items].filter(([name, item]) => item.isOpen || !(name in kept || this.pending.has(name))).length;
     this.next.disabled = left > 0 || this.pending.size > 0;
     const saying = !this.link.isOpen ? "No connection: your answers are sent when it is back." : this.pending.size ? "Saving …" : "";
     this.state.textContent = this.card.error || saying || (left ? `${left} to answer` : this.items.size ? "All answered and saved." : "");

@@ -117,6 +117,33 @@ def test_a_study_of_two_through_the_page_killed_and_resumed(new_page, tmp_path):
     assert "demo" in done.stdout
 
 
+def test_next_waits_until_what_is_typed_is_what_is_kept(new_page, tmp_path):
+    root = tmp_path / "study"
+    study_folder(root, QUESTIONS.replace('"end"', '"start"'), forms=[])
+    with running(root, "P001") as (_, address):
+        driver = ParticipantDriver(new_page(), address, 5)
+        driver.go_on(lambda each: each.title == "Before we begin")
+        page, state = driver.page, driver.page.locator("#study-state")
+        age, remark = page.locator("#study input[type=number]"), page.locator("#study textarea")
+        age.fill("25")
+        remark.fill(REMARK)
+        saved = "All answered and saved."
+        expect(state).to_have_text(saved, timeout=60_000)
+        for field, wrong, right in ((age, "250", "26"), (remark, "", "More")):
+            field.fill(wrong)
+            expect(state).to_have_text("1 to answer")
+            field.blur()
+            page.wait_for_timeout(2500)  # answers are drawn again each second
+            expect(state).to_have_text("1 to answer")
+            expect(driver.at("study-next")).to_be_disabled()
+            assert field.input_value() == wrong
+            field.fill(right)
+            expect(state).to_have_text(saved, timeout=60_000)
+        page.get_by_label("I prefer not to answer").first.check()
+        expect(state).to_have_text(saved, timeout=60_000)
+        assert json_answers(root)["P001"]["start"] == {"age": None, "remarks": "More"}
+
+
 def json_answers(root):
     """Return the answers on the disk by participant and form."""
     files = sorted(root.glob("participants/*/answers.json"))
