@@ -45,7 +45,7 @@ class Field {
     this.wrong = make("p", "wrong");
     this.say = say;
     this.input.addEventListener("input", () => this.typed());
-    this.input.addEventListener("change", () => this.typed(0));
+    this.input.addEventListener("change", () => { if (this.isOpen) this.typed(0); });
     item.box.append(this.input, this.wrong);
     if (item.declines) this.declined = new Choices({ ...item, declines: true }, (value) => this.decline(value), [], item.box);
   }
