@@ -58,6 +58,8 @@ class Driving:
         if self._cockpit and self._cockpit.person.phase is Phase.STOPPED:
             self._server.unread.append((Kind.STOP, None))  # a STOP holds until somebody releases it
         refuses = frozenset(ALLOWED) - frozenset(study.allow) | {"practice"}
+        if "mask" in refuses:
+            refuses |= {"lock"}  # it changes the mask, too
         self._cockpit = Cockpit(
             env.model, {name: modes[name] for name in offered}, mode, self._server, refuses
         )

@@ -6,7 +6,10 @@ import { axisName, keyName } from "./keymap.js";
 
 const AGAIN = 1000; // after which an answer that is not yet kept is sent again [ms]
 const NEXT = ":next", PAUSE = ":pause";
-const CONTROLS = { mode: "mode", practice: "practice", undo: "undo", discard: "discard", restart: "restart", success: "success" };
+const CONTROLS = [
+  ...["mode", "practice", "undo", "discard", "restart", "success"].map((ask) => [ask, ask]),
+  ["mask", "one-joint"], ["mask", "channels"], ["lock", "locks"],
+];
 
 function make(tag, id, text = "") {
   const element = document.createElement(tag);
@@ -46,9 +49,10 @@ export class Study {
 
   // What the study does not let a participant do is not there.
   stage(stage) {
-    for (const [ask, id] of Object.entries(CONTROLS)) {
+    byId("owned").inert = stage.refuses.includes("mask"); // it still says which parts the participant steers
+    for (const [ask, id] of CONTROLS) {
       const control = byId(id);
-      const whole = control?.closest("label") ?? control;
+      const whole = control?.closest("label, details:not(#more)") ?? control;
       if (whole && stage.refuses.includes(ask)) whole.style.display = "none";
     }
   }

@@ -201,6 +201,21 @@ def test_only_who_may_say_done_is_asked_whether_it_is(on_bench, refuses, asked, 
     assert driver.page.evaluate(script, list(refuses)) == [asked, is_open]
 
 
+@pytest.mark.parametrize("refuses", [(), ("lock", "mask")])
+def test_a_refused_mask_cannot_be_asked_for(on_bench, refuses):
+    script = """async (refuses) => {
+      const { Study } = await import("./study.js");
+      new Study({}, () => []).stage({ refuses });
+      document.getElementById("more").open = true;
+      for (const each of document.querySelectorAll("#more details")) each.open = true;
+      return document.getElementById("owned").inert;
+    }"""
+    _, driver = on_bench()
+    assert driver.page.evaluate(script, list(refuses)) == bool(refuses)
+    shown = [driver.at(name).is_visible() for name in ("one-joint", "channels", "locks", "numbers")]
+    assert shown == [not refuses, not refuses, not refuses, True]
+
+
 @pytest.mark.parametrize(
     ("now", "chip", "banner"),
     [

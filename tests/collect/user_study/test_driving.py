@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import pytest
 from user_study_helpers import study_folder
 
 from handrail.collect.cockpit.pipe import Kind
@@ -13,9 +14,10 @@ from handrail.controllers.interrupts import Interrupts
 class StoppingServer:
     """Passes on a Start, a STOP, and then that the trial has failed."""
 
-    def __init__(self):
-        start = (Kind.ASK, {"what": "start", "value": True})
-        self.pipe, self.dropped, self.unread = self, Counter(), [start, (Kind.STOP, None)]
+    def __init__(self, *asks):
+        asked = [{"what": what, "value": value} for what, value in (*asks, ("start", True))]
+        self.unread = [*((Kind.ASK, each) for each in asked), (Kind.STOP, None)]
+        self.pipe, self.dropped = self, Counter()
         self.sent = []
 
     def receive(self):
@@ -46,3 +48,17 @@ def test_the_page_knows_the_robot_before_a_card_says_its_keys(tmp_path):
     with Interrupts() as interrupts, Driving(folder, "P001", server, interrupts) as driving:
         driving.prepare("ee", "reach")
         assert Kind.STAGE in server.sent
+
+
+@pytest.mark.parametrize("allow", [[], ["mask"]])
+@pytest.mark.parametrize("what", ["mask", "lock"])
+def test_a_mask_that_is_locked_is_changed_by_nothing(what, allow, tmp_path):
+    server, folder = StoppingServer((what, [0, 1, 2])), study_folder(tmp_path, allow=allow)
+    with Interrupts() as interrupts, Driving(folder, "P001", server, interrupts) as driving:
+        briefing = driving.prepare("ee", "reach")
+        driving.run(Step("practice", "ee", "reach"), 3)
+        person = driving._cockpit.person
+    mask = person.meaning.mask(person.setting)
+    owned = {name for name, own in zip(person.meaning.channels.names, mask, strict=True) if own}
+    assert (owned == set(briefing.channels)) == (not allow)
+    assert person.setting.switches == len(allow)
