@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.source import EditSource, opened
+from handrail.datasets.editing.source import EditSource, check_none_set_aside, opened
 from handrail.datasets.format.episode_rows import row_files
 from handrail.datasets.format.info_file import Encodings
 from handrail.datasets.format.layout import Layout
@@ -20,6 +20,7 @@ from handrail.datasets.recording.frames import shared_features
 from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import explained, followed
+from handrail.datasets.storage.lock import FolderLock
 from handrail.datasets.storage.strict_json import known_json
 
 _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
@@ -102,6 +103,9 @@ def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]
     with explained(f"cannot write {str(root)!r}"):
         settle(root)  # what was cut short is done; dropping the same again does no harm
         if _is_empty(root):
+            with FolderLock(Layout(root).staging):
+                check_none_set_aside(Layout(root))
+                remove_whole(root)  # files of a first episode that was cut short may lie there
             return 0
     with opened([root], root, verify=True) as (source,):
         kept = [row["episode_index"] for row in source.rows if not dropped(row)]

@@ -84,6 +84,15 @@ class EditSource:
                 ) from error
 
 
+def check_none_set_aside(layout: Layout) -> None:
+    """Check that nothing lies in a dataset's quarantine."""
+    if layout.damaged.exists():
+        raise HandrailError(
+            f"dataset {str(layout.root)!r}: in {layout.damaged.name} are episodes that were set aside,"
+            " or files of none, which the edit does not see: move that folder elsewhere first"
+        )
+
+
 @contextmanager
 def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterator[list[EditSource]]:
     """Provide datasets whose episodes go to a target, which nobody else writes if it is one of them."""
@@ -103,9 +112,5 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
         own = EditSource.open(target)
         with FolderLock(own.layout.staging):
             tidy_locked(own.layout, own.manifest, Checksums(target, anew=verify))
-            if own.layout.damaged.exists():
-                raise HandrailError(
-                    f"dataset {str(target)!r}: in {own.layout.damaged.name} are episodes that were set aside,"
-                    " or files of none, which the edit does not see: move that folder elsewhere first"
-                )
+            check_none_set_aside(own.layout)
             yield [own if root == target else EditSource.open(root, verify) for root in roots]

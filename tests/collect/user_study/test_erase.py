@@ -1,5 +1,6 @@
 """Laws of what comes of a study: erased is erased, tables explain themselves, nobody is made up."""
 
+import bisect
 import json
 import random
 import shutil
@@ -71,6 +72,23 @@ def erased_in_two_goes(two, root, k):
 def test_an_erasure_that_is_killed_is_finished_by_the_next(two, tmp_path):
     for k in random.Random(1).sample(range(1, 100), 3):
         erased_in_two_goes(two, tmp_path / str(k), k)
+
+
+def test_erasing_leaves_nothing_of_a_first_trial_that_was_cut_short(tmp_path):
+    def killed(k):
+        folder = study_folder(tmp_path / str(k))
+        GUILLOTINE.run(folder.root, k, lambda: session(folder, "P001"))
+        return folder
+
+    commit = bisect.bisect(range(200), 0, lo=1, key=lambda k: len(trials(killed(k)))) - 1
+    for k in (commit, commit - 1, commit - 4):
+        shutil.rmtree(tmp_path / str(k), ignore_errors=True)
+        folder = killed(k)
+        assert not trials(folder)
+        assert [path for path in (folder.root / "data").rglob("*") if path.suffix == ".parquet"]
+        assert "episodes: none" in erased(folder, "P001")
+        assert not texts(folder.root / "data")
+        assert not [path for path, content in texts(folder.root).items() if b"P001" in content]
 
 
 @pytest.mark.slow

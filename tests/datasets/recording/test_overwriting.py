@@ -136,6 +136,21 @@ def test_without_episodes_there_is_no_dataset(recorded):
     assert not list(recorded.parent.iterdir())
 
 
+def test_a_first_episode_that_was_cut_short_goes_with_its_dataset(tmp_path):
+    root = tmp_path / "d"
+    with create(root) as writer:
+        (root / ".handrail" / "half").write_bytes(b"an episode")
+        with pytest.raises(HandrailError, match="is being written by another"):
+            drop_episodes(root, lambda columns: True)
+        writer.discard_episode()
+    Layout(root).damaged.mkdir()
+    with pytest.raises(HandrailError, match=r"in \.damaged are episodes that were set aside"):
+        drop_episodes(root, lambda columns: True)
+    Layout(root).damaged.rmdir()
+    assert drop_episodes(root, lambda columns: True) == 0
+    assert not list(tmp_path.iterdir())
+
+
 def test_episodes_set_aside_are_not_passed_over(recorded):
     Layout(recorded).damaged.mkdir()
     with pytest.raises(HandrailError, match=r"in \.damaged are episodes that were set aside"):
