@@ -139,6 +139,7 @@ class Conductor:
     def _tries(self, step: Step) -> bool:
         while True:
             self._show_strip(f"Trial {step.trial} of {self._study.trials}: this one counts")
+            self._note(f"{step.key} begun")  # a crash leaves no other trace of it
             outcome = self._driving.run(step, trial_seed(self._study, step.task, step.trial))
             if outcome.kept:
                 return True

@@ -9,6 +9,7 @@ from datasets_guillotine import Guillotine
 from datasets_helpers import TINY_FEATURES, create, record_one
 from user_study_helpers import (
     SyntheticDesk,
+    TinyTrack,
     answer_of,
     erased,
     session,
@@ -136,6 +137,23 @@ def test_a_trial_that_is_paused_begins_anew_and_is_counted(tmp_path):
     assert first[0] == first[1]
     assert sum(int(row["interrupted"]) for row in table(folder, "trials")) == 1
     assert trials(folder) == wanted(folder, "P001")
+
+
+def test_a_trial_that_is_cut_is_counted(tmp_path, monkeypatch):
+    folder, run, cuts = study_folder(tmp_path), TinyTrack.run, [1, 1, 1]
+
+    def cut(track, step, seed):
+        if step.kind == "trial" and cuts:
+            cuts.pop()
+            raise KeyboardInterrupt
+        return run(track, step, seed)
+
+    monkeypatch.setattr(TinyTrack, "run", cut)
+    while cuts:
+        with pytest.raises(KeyboardInterrupt):
+            session(folder, "P001")
+    session(folder, "P001", events=[EpisodeEvent.RESTART])  # and once more, by the participant
+    assert sorted(row["interrupted"] for row in table(folder, "trials")) == ["0", "4"]
 
 
 def test_a_participant_who_ends_for_today_goes_on_with_that_trial(tmp_path):
