@@ -13,7 +13,7 @@ from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.forms import CONSENT, REFUSED, form
 from handrail.collect.user_study.items import Answer, Form, Item
 from handrail.collect.user_study.participant import Interrupted, Noted, Participant, Practised
-from handrail.collect.user_study.plan import Step, pairs_rng, plan, practice_seed, trial_seed
+from handrail.collect.user_study.plan import Step, pairs_rng, practice_seed, trial_seed
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.scores import DEMO
 
@@ -61,7 +61,7 @@ class Conductor:
 
     def run(self) -> Ending:
         """Do what is left; return how it ended."""
-        who, steps, left = self._who, plan(self._study, self._who.session.slot), self._folder.left(self._who)
+        who, steps, left = self._who, self._folder.steps(self._who), self._folder.left(self._who)
         self._note(f"begun with {len(steps) - len(left)} of {len(steps)} steps done")
         for step in left:
             if self._is_refused:

@@ -152,17 +152,23 @@ class StudyFolder:
             for _, _, root in self.conditions:
                 settle(root)
 
+    def steps(self, who: Participant) -> tuple[Step, ...]:
+        """Return all steps, in the order that was drawn when the participant was new."""
+        return tuple(plan(self.study, who.session.modes, who.session.tasks))
+
     def left(self, who: Participant) -> list[Step]:
         """Return the steps that are left; practice is over once a trial after it is done."""
         done = set(who.finished)
         for mode, task, _ in self.conditions:
             trials = {
-                f"{mode}/{task}/{row['trial']}" for row in self.episodes(mode, task) if _is_of(row, who)
+                f"{mode}/{task}/{row['trial']}"
+                for row in self.episodes(mode, task)
+                if row["participant"] == who.name
             }
             if trials or self.study.practice.is_over(who.practised(mode, task)):
                 done.add(Step("practice", mode, task).key)
             done |= trials
-        return [step for step in plan(self.study, who.session.slot) if step.key not in done]
+        return [step for step in self.steps(who) if step.key not in done]
 
     def _content(self) -> dict[str, Any]:
         if not self._written.exists():
@@ -171,7 +177,3 @@ class StudyFolder:
                 f" write one: handrail-user-study new {shlex.quote(str(self.root))}"
             )
         return read_toml(self._written, "study")
-
-
-def _is_of(row: Mapping[str, Any], who: Participant) -> bool:
-    return row["participant"] == who.name

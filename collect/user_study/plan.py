@@ -81,12 +81,8 @@ class Step:
         return f"{self.condition}, {self.task}, {what}"
 
 
-def plan(study: UserStudy, slot: int) -> tuple[Step, ...]:
-    """Return all steps of a participant."""
-    return tuple(_steps(study, *orders(study, slot)))
-
-
-def _steps(study: UserStudy, modes: tuple[str, ...], tasks: tuple[str, ...]) -> Iterator[Step]:
+def plan(study: UserStudy, modes: tuple[str, ...], tasks: tuple[str, ...]) -> Iterator[Step]:
+    """Yield all steps of a participant, whose orders of modes and tasks `orders` drew once."""
     asked = {question.when for question in study.questions}
     yield Step("form", form=CONSENT)
     if "start" in asked:

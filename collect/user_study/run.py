@@ -11,7 +11,6 @@ from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.driving import Driving
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
-from handrail.collect.user_study.plan import plan
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.presentation.table import Table
@@ -48,7 +47,7 @@ def status(folder: StudyFolder) -> Table:
     """Return a table of the participants: what is done, and what comes next."""
     rows = []
     for who in folder.participants().values():
-        steps, left, session = plan(folder.study, who.session.slot), folder.left(who), who.session
+        steps, left, session = folder.steps(who), folder.left(who), who.session
         stands = "being erased" if session.erasing else str(left[0]) if left else "done"
         done = f"{len(steps) - len(left)} of {len(steps)}"
         rows.append((who.name, ", ".join(session.modes), done, stands))

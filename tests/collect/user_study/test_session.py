@@ -25,8 +25,8 @@ from handrail.collect.user_study.conduct import Ending
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.design import Practice
 from handrail.collect.user_study.folder import StudyFolder
-from handrail.collect.user_study.plan import plan, practice_seed, trial_seed
-from handrail.collect.user_study.run import study_session
+from handrail.collect.user_study.plan import practice_seed, trial_seed
+from handrail.collect.user_study.run import status, study_session
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.scores import DEMO
 
@@ -42,7 +42,7 @@ def test_a_session_does_everything_once_in_the_participant_s_order(tmp_path):
     assert ending is Ending.DONE
     assert not folder.left(who)
     assert trials(folder) == wanted(folder, "P001")
-    steps = plan(study, who.session.slot)
+    steps = folder.steps(who)
     assert track.done == [
         (
             step.key,
@@ -59,6 +59,21 @@ def test_a_session_does_everything_once_in_the_participant_s_order(tmp_path):
     again, _, track = session(folder, "P001")
     assert again is Ending.DONE
     assert not track.done
+
+
+def test_a_participant_s_order_is_drawn_once(tmp_path):
+    folder = study_folder(tmp_path, modes=["ee", "direct", "joints"])
+    session(folder, "P001", SyntheticDesk("P001", pauses="P001/consent"))
+    who = folder.participant("P001")
+    who.keep(modes=who.session.modes[::-1])  # as another version of NumPy may have drawn them
+    _, desk, track = session(folder, "P001")
+    driven = [key.split("/")[0] for key, _ in track.done if key.endswith("/1")]
+    assert driven == list(who.session.modes)
+    position = {row["condition"]: int(row["position"]) for row in table(folder, "trials")}
+    assert position == {mode: index + 1 for index, mode in enumerate(driven)}
+    parts = [card["text"][0].split()[-1] for card in desk.cards if card.get("title", "").startswith("Part ")]
+    assert parts == driven
+    assert status(folder).rows[0][1:3] == (", ".join(driven), "10 of 10")
 
 
 def test_newcomers_get_free_rows_of_the_design(tmp_path):
