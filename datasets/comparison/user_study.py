@@ -83,7 +83,7 @@ def read_study(root: Path) -> StudyData:
     demo = described.get("demo", False) if isinstance(described, dict) else None
     if not isinstance(demo, bool):
         raise HandrailError(f"{str(root / 'study.json')!r}: expected demo to be true or false, got {demo!r}")
-    infos = sorted(root.glob("data/*/*/meta/info.json"))
+    infos = sorted(root.glob("data/[!.]*/[!.]*/meta/info.json"))
     datasets = {(info.parents[2].name, info.parents[1].name): info.parents[1] for info in infos}
     if not datasets:
         raise HandrailError(f"study {str(root)!r}: expected datasets in data/TASK/MODE, found none yet")

@@ -3,6 +3,7 @@
 import csv
 import itertools
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from handrail.datasets.comparison import people as comparing
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.people import FORMS, compare_people, paired_by_scene, people_report
 from handrail.datasets.comparison.scores import DEMO, SCORES, read_scores
-from handrail.datasets.comparison.user_study import Trial
+from handrail.datasets.comparison.user_study import Trial, read_study
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.statistics.contrast import LEVEL, holm
 from handrail.datasets.statistics.resampling import bootstrap_mean
@@ -261,6 +262,13 @@ def test_a_wrong_score_is_refused(lines, words, tmp_path):
     write_scores(tmp_path, lines)
     with pytest.raises(HandrailError, match=words):
         read_scores(tmp_path / "exports" / "scores.csv")
+
+
+@pytest.mark.parametrize("hidden", [".ee.old", ".ee.partial"])
+def test_folders_of_an_erasure_that_was_cut_short_are_no_conditions(hidden, tmp_path):
+    root = study(tmp_path / "study", {("reach", "ee"): [("P001", 1, 5, True)]}, ["P001,ee,sus,50"])
+    shutil.copytree(root / "data" / "reach" / "ee", root / "data" / "reach" / hidden)
+    assert list(read_study(root).datasets) == [("reach", "ee")]
 
 
 def test_no_bytes_make_a_traceback(tmp_path):
