@@ -79,8 +79,7 @@ def _trials(folder: StudyFolder, people: Sequence[Participant]) -> Iterator[dict
         for row in folder.episodes(mode, task):
             if who := known.get(row["participant"]):
                 cuts = [(each.condition, each.task, each.trial) for each in who.session.interrupted]
-                begun = f"{mode}/{task}/{row['trial']} begun"
-                times = sum(each.what == begun for each in who.session.events)
+                begun = sum(each.what == f"{mode}/{task}/{row['trial']} begun" for each in who.session.events)
                 yield row | {
                     "condition": mode,
                     "position": who.session.modes.index(mode) + 1,
@@ -88,7 +87,7 @@ def _trials(folder: StudyFolder, people: Sequence[Participant]) -> Iterator[dict
                     "dataset": str(root.relative_to(folder.root)),
                     "frames": row["length"],
                     "seconds": round(row["length"] * (1 / folder.study.fps), 3),
-                    "interrupted": max(times - 1, cuts.count((mode, task, row["trial"]))),
+                    "interrupted": max(begun - 1, cuts.count((mode, task, row["trial"]))),
                 }
 
 

@@ -20,7 +20,7 @@ from typing import Any
 from handrail.collect.user_study.design import UserStudy
 from handrail.collect.user_study.participant import Participant, SessionRecord, check_id, now
 from handrail.collect.user_study.plan import Step, orders, plan
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import Text, decoded
 from handrail.controllers.versions import SIMULATION, versions
@@ -39,7 +39,7 @@ class FrozenStudy:
 
     study: Mapping[str, Any]
     demo: bool
-    versions: Mapping[str, Any]
+    versions: Mapping[str, Text]
     frozen: Text  # the time
 
 
@@ -65,14 +65,19 @@ class StudyFolder:
         """The study: as it is frozen, or else as it is written."""
         if not self._frozen.exists():
             return decoded(self._content(), UserStudy, f"study {self._written}")
-        content = load_json(self._frozen, "a study of handrail-user-study")
-        frozen = decoded(content, FrozenStudy, str(self._frozen))
+        frozen = self.frozen
         if self._written.exists() and self._content() != frozen.study:
             raise HandrailError(
                 f"study {self._written}: it was changed after {frozen.frozen}, when the first participant"
                 f" began: expected the text of {self._frozen.name}; put it back, or begin a new folder"
             )
         return decoded(frozen.study, UserStudy, f"study {self._frozen}")
+
+    @cached_property
+    def frozen(self) -> FrozenStudy:
+        """The study as it is frozen."""
+        content = load_json(self._frozen, "a study of handrail-user-study")
+        return decoded(content, FrozenStudy, str(self._frozen))
 
     def freeze(self) -> None:
         """Let the study stay as it is from now on."""
@@ -97,8 +102,7 @@ class StudyFolder:
         """Return somebody who has begun."""
         check_id(name)
         known = self.participants()
-        if name not in known:
-            raise unknown_name("participant", name, known or ("nobody yet",))
+        check_known("participant", (name,), known or ("nobody yet",))
         return known[name]
 
     def welcome(self, name: str) -> Participant:

@@ -12,6 +12,7 @@ from handrail.collect.user_study.driving import Driving
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.controllers.interrupts import Interrupts
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
@@ -49,8 +50,7 @@ def status(folder: StudyFolder) -> Table:
     for who in folder.participants().values():
         steps, left, session = folder.steps(who), folder.left(who), who.session
         stands = "being erased" if session.erasing else str(left[0]) if left else "done"
-        done = f"{len(steps) - len(left)} of {len(steps)}"
-        rows.append((who.name, ", ".join(session.modes), done, stands))
+        rows.append((who.name, ", ".join(session.modes), f"{len(steps) - len(left)} of {len(steps)}", stands))
     return Table(("participant", "order", "steps done", "next"), tuple(rows))
 
 
@@ -78,6 +78,9 @@ def _run(config: StudySessionConfig, folder: StudyFolder, say: Callable[[str], N
     who = folder.welcome(config.participant)
     if folder.study.demo:
         say(folder.study.source)
+    was, now = folder.frozen.versions, versions(*SIMULATION)
+    if changed := [f"{name} {now[name]} (was {was.get(name)})" for name in now if now[name] != was.get(name)]:
+        say(f"other versions than at the study's beginning: {', '.join(changed)}")
     server = open_server(config.cockpit, say)
     try:
         with Interrupts() as interrupts, Driving(folder, who.name, server, interrupts) as driving:

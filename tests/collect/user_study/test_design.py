@@ -1,9 +1,14 @@
 """A study's file is checked whole where it enters: one line that says what is wrong."""
 
+import json
 import tomllib
 
+import numpy as np
 import pytest
+from user_study_helpers import study_folder
 
+from handrail.collect.user_study import run
+from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.design import UserStudy
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.controllers.errors import HandrailError
@@ -77,3 +82,20 @@ def test_a_study_that_has_begun_stays_as_it_is(tmp_path):
         _ = StudyFolder(tmp_path).study
     path.unlink()
     assert StudyFolder(tmp_path).study == folder.study
+
+
+def test_a_participant_under_other_versions_is_said(tmp_path, monkeypatch, capsys):
+    def no_page(*_):
+        raise HandrailError("no page here")
+
+    monkeypatch.setattr(run, "open_server", no_page)
+    study_folder(tmp_path).freeze()
+    for changed in ({}, {"numpy": "1.2.3"}):
+        frozen = json.loads((tmp_path / "study.json").read_text())
+        frozen["versions"] |= changed
+        (tmp_path / "study.json").write_text(json.dumps(frozen))
+        with pytest.raises(HandrailError, match="no page here"):
+            run.study_session(StudySessionConfig("run", str(tmp_path), "P001"))
+        said = " ".join(capsys.readouterr().err.split())
+        expected = f"other versions than at the study's beginning: numpy {np.__version__} (was 1.2.3)"
+        assert (expected in said) == ("other versions" in said) == bool(changed)
