@@ -35,7 +35,7 @@ from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.objectives.together import usual_objectives
+from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
@@ -125,7 +125,8 @@ class MaskedMpcStep(RobotActionProcessorStep):
         usual = asdict(MpcSettings.of(model.description.world.scale))
         settings = decoded(usual | self.settings, MpcSettings, f"{NAME} settings")
         settings.check_period(1.0 / self.fps, f"fps of {NAME}")
-        self._mpc = MaskedMpc(model, settings, usual_objectives(channels, model.description.limits))
+        centring = narrow_joint_centring(channels, model.description.limits)
+        self._mpc = MaskedMpc(model, settings, centring)
         self.reset()
 
     def reset(self) -> None:

@@ -24,7 +24,7 @@ from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.objectives.together import usual_objectives
+from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.registry import fitting, resolved
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.datasets.format.schema import Feature
@@ -126,7 +126,7 @@ def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str 
     channels = Channels.of(model.description)
     make = TASKS.find(task).objectives if task and mode.task_objectives else None
     of_task = resolved(make)(channels, model.number) if make else ()
-    return build(model, 1.0 / fps, (*of_task, *usual_objectives(channels, model.description.limits)))
+    return build(model, 1.0 / fps, (*of_task, *narrow_joint_centring(channels, model.description.limits)))
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:

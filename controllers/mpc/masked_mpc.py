@@ -17,7 +17,7 @@ from handrail.controllers.mpc.build import ProblemBuilder, built_in_objectives
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.mpc.supervision import Supervisor
 from handrail.controllers.objectives.objective import Objective
-from handrail.controllers.objectives.together import TOGETHER, together_parameters
+from handrail.controllers.objectives.together import TOGETHER, together, together_parameters
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.ocp.settings import MpcSettings
@@ -38,7 +38,8 @@ class MaskedMpc:
     Args:
         model: of the robot.
         settings: weights, margins, horizon; made to the measure of the robot's world by default.
-        objectives: autonomous objectives besides the built-in ones.
+        objectives: autonomous objectives besides the built-in ones; `together` of a robot with two hands is
+            built in too, unless it is among them with weights of its own.
         predict: intent prediction Ψ of every source that brings none of its own.
 
     Attributes:
@@ -57,8 +58,10 @@ class MaskedMpc:
         self.settings = settings or MpcSettings.of(model.description.world.scale)
         self.channels = Channels.of(model.description)
         built_in = built_in_objectives(model, self.channels, self.settings)
+        lacks_pair = self.channels.pair and TOGETHER not in [each.name for each in objectives]
+        pair = (together(self.channels),) if lacks_pair else ()
         horizon = self.settings.horizon
-        self.residuals = StageResiduals(model, (*built_in, *objectives), horizon)
+        self.residuals = StageResiduals(model, (*built_in, *objectives, *pair), horizon)
         self.solver = RealTimeSolver(self.residuals, horizon, model.size, self.settings.dt)
         self._builder = ProblemBuilder(model, self.settings, self.residuals)
         self._validator = InputValidator(self.channels, self.settings.intent_timeout)
@@ -111,7 +114,7 @@ class MaskedMpc:
             return loop.facing(state, intent, self.channels)
         pair = intent.mask[self.channels.pair_slice]
         steered = bool(pair.any()), bool(pair[-1])
-        if steered[0] and steered != loop.paired and TOGETHER in self.residuals.names:
+        if steered[0] and steered != loop.paired:
             parameters = loop.parameters.copy()
             parameters[self.residuals.parameter_slice(TOGETHER)] = together_parameters(
                 self.model, state.expected

@@ -39,7 +39,7 @@ def posture(channels: Channels, reference: FloatArray, weights: FloatArray) -> O
     return Objective("posture", lambda stage, p: stage.q, np.array(reference), masked)
 
 
-def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> tuple[Objective, ...]:
+def narrow_joint_centring(channels: Channels, limits: Limits, weight: float = 10.0) -> tuple[Objective, ...]:
     """Draw joints of the arm that cannot turn half around to their middle while just the tool is steered.
 
     `(q - middle) / half`, (n,). A hand that is steered straight to where it shall be may otherwise lead them

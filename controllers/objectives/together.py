@@ -7,18 +7,9 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.objectives.hold import bounded_pull, hold_parameters, turn_between
 from handrail.controllers.objectives.objective import Objective, Stage
-from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.robot.model import Pose, RobotModel
-from handrail.controllers.robot.parts import Limits
 
 TOGETHER = "together"
-_CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
-
-
-def usual_objectives(channels: Channels, limits: Limits) -> tuple[Objective, ...]:
-    """Return what the masked MPC of a robot looks after whatever the task: narrow joints, and a pair."""
-    pair = (together(channels),) if channels.pair else ()
-    return (*narrow_joint_centring(channels, limits, _CENTRED), *pair)
 
 
 def together(channels: Channels, position: float = 200.0, orientation: float = 50.0) -> Objective:

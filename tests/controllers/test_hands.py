@@ -12,7 +12,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.hold import end_effector_hold
 from handrail.controllers.objectives.ownership import leaves_freedom, steered_joints
-from handrail.controllers.objectives.together import together, together_parameters
+from handrail.controllers.objectives.together import TOGETHER, together, together_parameters
 from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
@@ -26,7 +26,7 @@ AHEAD = [0.1, 0.0, 0.05, 0.0, 0.0, 0.1]
 
 @pytest.fixture(scope="module")
 def mpc():
-    return MaskedMpc(MODEL, objectives=(together(CHANNELS),))
+    return MaskedMpc(MODEL)
 
 
 class Driven:
@@ -111,6 +111,21 @@ def test_a_pair_is_kept_as_it_begins_while_the_base_drives(mpc):
     assert np.linalg.norm(after[:3] - before[:3]) < 5e-3
     assert np.degrees(turn.magnitude()) < 1.0
     assert driven.brakes == 0
+
+
+def test_the_plain_controller_keeps_a_pair(mpc):
+    driven, before = Driven(mpc), together_parameters(MODEL, HOME)
+    driven.steer(("pair",), [0.2, *[0.0] * 5], 4.0)
+    after = together_parameters(MODEL, driven.state.q)
+    turn = Rotation.from_matrix(after[3:].reshape(3, 3) @ before[3:].reshape(3, 3).T)
+    assert np.linalg.norm(after[:3] - before[:3]) < 5e-3
+    assert np.degrees(turn.magnitude()) < 1.0
+
+
+def test_a_pair_is_kept_once_with_weights_of_ones_own():
+    own = together(CHANNELS, position=1.0)
+    objectives = MaskedMpc(MODEL, objectives=(own,)).residuals.objectives
+    assert [each for each in objectives if each.name == TOGETHER] == [own]
 
 
 def test_rows_take_their_own_arm_first():
