@@ -18,6 +18,10 @@ class HandrailError(Exception):
     """
 
 
+SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)
+"""Those of a calculation that finds nothing: of ours, numpy, CasADi, coal."""
+
+
 def message_of(error: BaseException) -> str:
     """Return what an exception says, in one line of sane length; its type where it says nothing.
 

@@ -18,8 +18,9 @@ import numpy as np
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.session.outcome import Tally
 from handrail.collect.world.env import HandrailEnv, Observation
-from handrail.controllers.arrays import FloatArray
-from handrail.controllers.interface.command import Command
+from handrail.controllers.arrays import FloatArray, are_finite
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.command import Command, Status
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.usual_frames import in_usual_frames
@@ -218,14 +219,32 @@ class EpisodeLoop:
                 self._controller.update_scene(self.env.plant.obstacles())
             if isinstance(self._controller, Aiming) and (goal := self._goal):
                 self._controller.aim(goal)
-            now.command = self._controller.update(now.view.state, intent)
+            now.command = self._checked(self._controller.update(now.view.state, intent))
             now.asked, now.due = step, now.due + self.control_period
             self.tally.updated(now.command)
         time = (step + 1 - now.asked) * self.env.period
         grippers = now.command.grippers
-        if all(map(math.isnan, grippers)):  # nobody has asked yet; of some NaN the gate brakes
+        if all(map(math.isnan, grippers)):  # nobody has asked yet
             grippers = now.info["sent"][self.env.model.size :]
         return np.concatenate((now.command.velocity(time), grippers))
+
+    def _checked(self, command: Command) -> Command:
+        """Return a controller's command, of the robot's size; a brake if a number of it is not finite."""
+        n, hands = self.env.model.size, len(self.env.model.description.hands)
+        wanted, found = f"a Command with {n} velocities and {hands} grippers", f"a {type(command).__name__}"
+        if isinstance(command, Command):
+            found += f" with {command.velocities.shape[1]} velocities and {len(command.grippers)} grippers"
+        if found != wanted:
+            name = type(self._controller).__name__
+            raise HandrailError(f"controller {name}: expected {wanted}, got {found}")
+        grippers = command.grippers
+        valid = all(map(math.isfinite, grippers)) or all(map(math.isnan, grippers))
+        if valid and are_finite(command.velocities.ravel()):
+            return command
+        failed = replace(command.diagnostics, status=Status.SOLVER_FAILED)
+        return Command(
+            np.zeros((2, n)), self.control_period, grippers=(math.nan,) * hands, diagnostics=failed
+        )
 
     @property
     def _goal(self) -> Pose | None:

@@ -6,10 +6,10 @@ from time import perf_counter
 
 import numpy as np
 
-from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.arrays import BoolArray, FloatArray, are_finite
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import SOLVER_ERRORS, HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
@@ -23,7 +23,7 @@ from handrail.controllers.typed import Positive, check
 Ask = Callable[[State, Intent, FloatArray], FloatArray]
 """State, intent, velocity commanded last (n,) → velocity wanted (n,) [m/s, rad/s].
 
-Raises HandrailError where there is none.
+Raises one of `SOLVER_ERRORS` where there is none.
 """
 
 
@@ -89,8 +89,8 @@ class ReactiveController:
         if status is Status.OK:
             self._grippers = closed(intent.grippers, len(self._grippers))
             try:
-                target = self._ask(state, intent, previous)
-            except HandrailError:
+                target = self._asked(state, intent, previous)
+            except SOLVER_ERRORS:
                 status = Status.SOLVER_FAILED
         q = state.q if state.is_of(self._model.size) else None
         velocity, clipped = self._limiter.limit(previous, target, self._period, q)
@@ -101,6 +101,13 @@ class ReactiveController:
         near = (np.inf, np.inf) if q is None else self._smallest(q)
         diagnostics = Diagnostics(status, solve_time, self.slack, *near)
         return Command(velocities, self._period, grippers=self._grippers, diagnostics=diagnostics)
+
+    def _asked(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
+        """Return the velocity wanted, checked: n finite numbers."""
+        target = np.asarray(self._ask(state, intent, previous), np.float64)
+        if target.shape != previous.shape or not are_finite(target):
+            raise HandrailError(f"velocity wanted: expected {len(previous)} finite numbers, got {target}")
+        return target
 
     def _smallest(self, q: FloatArray) -> tuple[float, float]:
         """Return the smallest distances now [m]; margins of what is held are seen by the way."""

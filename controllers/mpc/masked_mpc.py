@@ -5,7 +5,7 @@ from time import perf_counter
 from handrail.controllers.arrays import FloatArray, IntArray, are_finite
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import SOLVER_ERRORS
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Status
 from handrail.controllers.interface.controller import State
@@ -25,8 +25,6 @@ from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
 from handrail.controllers.solvers.real_time import NOTHING_ACTIVE, RealTimeSolver
-
-_SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
 
 
 class MaskedMpc:
@@ -133,7 +131,7 @@ class MaskedMpc:
         guess = loop.guess(state.time, self.settings.horizon, self.model.size)
         try:
             plan = self.solver.solve(problem, guess, loop.active)
-        except _SOLVER_ERRORS:
+        except SOLVER_ERRORS:
             return None, NOTHING_ACTIVE
         valid = plan.solved and are_finite(plan.v.ravel()) and are_finite(plan.q.ravel())
         return plan if valid else None, plan.active

@@ -68,7 +68,7 @@ COLUMNS = (
     Column("teleop.round_trip", "float32", lambda frame: _finite_number(frame.intent.raw.round_trip)),
     Column("teleop.undos", "int64", lambda frame: frame.undos),
     Column("controller.command", "float32", lambda frame: frame.command, "velocities"),
-    Column("controller.solve_time", "float32", lambda frame: frame.diagnostics.solve_time),
+    Column("controller.solve_time", "float32", lambda frame: _finite_number(frame.diagnostics.solve_time)),
     Column("controller.status", "string", lambda frame: frame.diagnostics.status.value),
     Column("controller.slack", "float32", lambda frame: _finite_number(frame.diagnostics.slack)),
     Column(

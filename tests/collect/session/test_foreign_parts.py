@@ -1,0 +1,98 @@
+"""Laws of parts from outside: whatever they say, the robot brakes, or it is one line."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from collect_helpers import Watcher
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_env, build_operator
+from handrail.collect.session.session import Session
+from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.command import Status
+from handrail.controllers.robot.model import load_model
+from handrail.datasets.recording.frames import frame_row
+
+CONFIG, MODEL = SessionConfig(task="reach", physics=False, time_limit=1.0), load_model()
+STICKS = build_operator(CONFIG, MODES["ee"], MODEL)
+
+
+def run(controller, operator=STICKS):
+    env, watcher = build_env(CONFIG, 20), Watcher()
+    try:
+        return Session(env, controller, operator, [watcher]).run(0), watcher.frames
+    finally:
+        env.close()
+
+
+class Changed(TwistController):
+    """Damped least squares, whose commands are changed."""
+
+    def __init__(self, change):
+        super().__init__(MODEL, WholeBodyCompletion(MODEL))
+        self._change = change
+
+    def update(self, state, intent):
+        return self._change(super().update(state, intent))
+
+
+def with_gap(command):
+    velocities = np.array(command.velocities)
+    velocities[-1, 2] = np.nan
+    return replace(command, velocities=velocities)
+
+
+def singular(q, previous, twist, period):
+    raise np.linalg.LinAlgError("Singular matrix")
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        Changed(with_gap),
+        Changed(lambda command: replace(command, velocities=np.full_like(command.velocities, np.inf))),
+        Changed(lambda command: replace(command, grippers=(np.inf,))),
+        *(
+            TwistController(MODEL, rule)
+            for rule in (
+                lambda *asked: np.full(9, np.nan),
+                lambda *asked: np.zeros(6),
+                lambda *asked: None,
+                singular,
+            )
+        ),
+    ],
+)
+def test_a_command_that_is_no_number_is_a_brake_that_counts(controller):
+    outcome, frames = run(controller)
+    assert outcome.brakes == outcome.frames == len(frames)
+    for frame in frames:
+        assert frame.diagnostics.status is Status.SOLVER_FAILED
+        assert not frame.action[:-1].any()
+        for name, values in frame_row(frame).items():
+            assert isinstance(values, str) or np.isfinite(values).all(), name
+
+
+@pytest.mark.parametrize(
+    ("change", "got"),
+    [
+        (
+            lambda command: replace(command, velocities=command.velocities[:, :6]),
+            "a Command with 6 velocities and 1 grippers",
+        ),
+        (
+            lambda command: replace(command, grippers=(0.0, 0.0)),
+            "a Command with 9 velocities and 2 grippers",
+        ),
+        (lambda command: np.zeros(9), "a ndarray"),
+        (lambda command: None, "a NoneType"),
+    ],
+)
+def test_a_command_of_another_size_is_refused_in_one_line(change, got):
+    wanted = "controller Changed: expected a Command with 9 velocities and 1 grippers, got "
+    with pytest.raises(HandrailError) as error:
+        run(Changed(change))
+    assert str(error.value) == wanted + got
