@@ -139,10 +139,8 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
     if config.mask:
         own = mode_of_mask(config.mask, Channels.of(model.description), mode.controller)
         mode = replace(own, task_objectives=mode.task_objectives)
-    if missing := _missing(mode, model):
-        raise HandrailError(
-            f"mode {mode.name}: expected a robot with channels {missing}, got {model.description.name}"
-        )
+    if reason := _reason_against(mode, model):
+        raise HandrailError(f"mode {mode.name}: {reason}")
     if not (CONTROLLERS.find(mode.controller).objectives and mode.task_objectives):
         return mode
     return mode.leaving(task.released_channels, task.owned_channels)
@@ -154,18 +152,21 @@ def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode
     known = [
         build_mode(replace(config, mode=name, mask=""), env.model)
         for name, mode in fit.items()
-        if mode.available
-        and not _missing(mode, env.model)
-        and CONTROLLERS.find(mode.controller).fits(env.model.description)
+        if not _reason_against(mode, env.model)
     ]
     return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
 
 
-def _missing(mode: TeleopMode, model: RobotModel) -> str:
-    """Return the channels of a mode that a robot does not have, such as `torso`."""
-    channels, hand = Channels.of(model.description), model.hand.name
+def _reason_against(mode: TeleopMode, model: RobotModel) -> str:
+    """Return why a robot cannot be driven in a mode; "" if it can."""
+    if not mode.available:
+        return f"expected the package {mode.module}, found none; install it"
+    robot, channels, hand = model.description, Channels.of(model.description), model.hand.name
     owned = dict.fromkeys((*mode.owned("hand", hand), *mode.owned("base", hand)))
-    return ", ".join(group for group in owned if not channels.have(group))
+    if missing := ", ".join(group for group in owned if not channels.have(group)):
+        return f"expected a robot with channels {missing}, got {robot.name}"
+    fits = CONTROLLERS.find(mode.controller).fits(robot)
+    return "" if fits else f"its controller cannot drive {robot.name}"
 
 
 def session_features(env: HandrailEnv, shared: bool = False) -> dict[str, Feature]:

@@ -7,9 +7,10 @@ import pytest
 from collect_helpers import Watcher
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import MODES
-from handrail.collect.session.build import build_env, build_operator
+from handrail.collect.operators.modes import MODES, TeleopMode, always
+from handrail.collect.session.build import build_env, build_mode, build_operator
 from handrail.collect.session.session import Session
+from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
@@ -18,6 +19,9 @@ from handrail.datasets.recording.frames import frame_row
 
 CONFIG, MODEL = SessionConfig(task="reach", physics=False, time_limit=1.0), load_model()
 STICKS = build_operator(CONFIG, MODES["ee"], MODEL)
+TABLE_ONLY = ControllerSpec("arm", lambda model, period: None, "of a table", fits=lambda robot: False)
+ARM = TeleopMode("arm", always("hand"), f"{__name__}:TABLE_ONLY", "an arm on a table")
+WAND = TeleopMode("wand", always("hand"), "mpc", "with a wand", module="no_such_wand")
 
 
 def run(controller, operator=STICKS):
@@ -96,3 +100,17 @@ def test_a_command_of_another_size_is_refused_in_one_line(change, got):
     with pytest.raises(HandrailError) as error:
         run(Changed(change))
     assert str(error.value) == wanted + got
+
+
+@pytest.mark.parametrize(
+    ("mode", "told"),
+    [
+        ("ARM", "its controller cannot drive ridgeback_ur10"),
+        ("WAND", "expected the package no_such_wand, found none; install it"),
+    ],
+)
+def test_a_mode_that_does_not_fit_is_refused_in_one_line(mode, told):
+    name = f"{__name__}:{mode}"
+    with pytest.raises(HandrailError) as error:
+        build_mode(replace(CONFIG, mode=name), MODEL)
+    assert str(error.value) == f"mode {name}: {told}"
