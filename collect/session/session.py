@@ -22,6 +22,7 @@ from handrail.collect.operators.operator import EpisodeEvent, Operator
 from handrail.collect.session.loop import ROUNDING, Disturbance, EpisodeLoop
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
+from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import LONG_AGO, Intent
@@ -163,6 +164,9 @@ class Session:
             view = loop.look()
             with loop.tally.timed("operator"):
                 answer = self.operator.act(view)
+            if not isinstance(answer, Intent | EpisodeEvent):
+                name, wanted = type(self.operator).__name__, "an Intent or an EpisodeEvent"
+                raise HandrailError(f"operator {name}: expected {wanted}, got {shown(answer)}")
             event = answer if isinstance(answer, EpisodeEvent) else None
             # while they do not steer, what the controller hears is stale, and it brakes
             asked = answer if isinstance(answer, Intent) else _stale(asked)

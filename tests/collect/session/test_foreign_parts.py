@@ -114,3 +114,25 @@ def test_a_mode_that_does_not_fit_is_refused_in_one_line(mode, told):
     with pytest.raises(HandrailError) as error:
         build_mode(replace(CONFIG, mode=name), MODEL)
     assert str(error.value) == f"mode {name}: {told}"
+
+
+class Says:
+    """An operator with one answer."""
+
+    def __init__(self, answer):
+        self._answer = answer
+
+    def reset(self, view, rng):
+        pass
+
+    def act(self, view):
+        return self._answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "got"), [(None, "None"), ("success", "'success'"), (np.zeros(2), "array([0., 0.])")]
+)
+def test_an_operator_whose_answer_is_no_intent_is_refused_in_one_line(answer, got):
+    with pytest.raises(HandrailError) as error:
+        run(TwistController(MODEL, WholeBodyCompletion(MODEL)), Says(answer))
+    assert str(error.value) == f"operator Says: expected an Intent or an EpisodeEvent, got {got}"
