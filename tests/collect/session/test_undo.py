@@ -176,13 +176,10 @@ def test_a_hand_keeps_what_it_holds_though_nobody_has_been_heard(mode):
     env.close()
 
 
-@pytest.mark.parametrize(
-    ("robot", "grippers"),
-    [("ridgeback_ur10", (0.0, 0.0)), ("tiago_pro", (math.nan, 0.0)), ("tiago_pro", (0.0, math.nan))],
-)
-def test_grippers_that_no_robot_has_brake(robot, grippers):
-    """Law: a controller's grippers of another size, or NaN in part, end no episode: the robot brakes."""
-    env = build_env(SessionConfig(task="tray", mode="direct", robot=robot), 20)
+@pytest.mark.parametrize("grippers", [(math.nan, 0.0), (0.0, math.nan)])
+def test_grippers_that_no_robot_has_brake(grippers):
+    """Law: a controller's grippers that are NaN in part end no episode: the robot brakes."""
+    env = build_env(SessionConfig(task="tray", mode="direct", robot="tiago_pro"), 20)
     controller = build_controller(MODES["direct"], env.model, 20)
     loop, ask = EpisodeLoop(env, controller), controller.update
     controller.update = lambda state, intent: replace(ask(state, intent), grippers=grippers)
