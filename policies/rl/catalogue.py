@@ -3,11 +3,16 @@
 from handrail.collect.operators.modes import TeleopMode, always
 from handrail.controllers.baselines.catalogue import ControllerSpec
 
+JOINTS = ("x", "y", "theta") + tuple(
+    f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+)
+"""Of the robot that the actor was trained on: a Ridgeback with a UR10."""
 CONTROLLER = ControllerSpec(
     "rl",
     "handrail.policies.rl.controller:RlController",
     "a base learned by reinforcement, damped least squares on the arm",
-    fits=lambda robot: len(robot.base.joints) == 3 and len(robot.joints) == 9,
+    fits=lambda robot: tuple(robot.joints) == JOINTS,
+    aims=True,
 )
 MODE = TeleopMode(
     "rl",

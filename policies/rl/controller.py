@@ -30,7 +30,7 @@ class RlController(TwistController):
     that the twists so far should have led to, and the action before.
 
     Args:
-        model: of the robot; its base must be planar and its arm must have six joints.
+        model: of the robot, a Ridgeback with a UR10.
         period: of the control loop [s]; the actor was trained with 0.03 s.
         actor: the trained network; the one that comes with Handrail by default.
     """

@@ -8,6 +8,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
+from handrail.policies.rl.catalogue import CONTROLLER, JOINTS
 
 OBSERVATION_SIZE = 54
 ACTION_SIZE = 3
@@ -30,9 +31,9 @@ class TrackingSituation:
 
 
 def check_robot(model: RobotModel) -> None:
-    """Check that a robot is of the kind that a policy drives."""
-    if len(model.description.base.joints) != 3 or model.size != 9:
-        words = f"expected a planar base and six arm joints, got {', '.join(model.joints)}"
+    """Check that a robot is of the kind that the actor was trained on."""
+    if not CONTROLLER.fits(model.description):
+        words = f"expected the joints {', '.join(JOINTS)}, got {', '.join(model.joints)}"
         raise HandrailError(f"robot {model.description.name} of the learnt baseline: {words}")
 
 

@@ -2,15 +2,20 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rl_helpers import random_actor
 
+from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_controller
+from handrail.collect.session.loop import Aiming
 from handrail.collect.world.ideal_robot import IdealRobot
 from handrail.collect.world.plant import Gate
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.tasks.goal_reaching import STEP
+from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
@@ -18,7 +23,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.controller import RlController
-from handrail.policies.rl.observation import conditioning
+from handrail.policies.rl.observation import check_robot, conditioning
 from handrail.policies.rl.policy import SHIPPED, Actor
 from handrail.scripts.bench.rl.env import FINAL_SEED, GoalReachingEnv, evaluate, evaluation_goals
 
@@ -54,6 +59,23 @@ def test_the_controller_moves_like_the_environment(controller):
             assert command.diagnostics.status is Status.OK
             assert np.allclose(v, env.velocity, atol=1e-5)
         assert np.abs(v[:3]).max() > 0.01
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_spec_says_whether_its_controller_wants_the_goal(name):
+    controller = build_controller(replace(MODES["ee"], controller=name), MODEL, 20.0)
+    assert CONTROLLERS[name].aims == isinstance(controller, Aiming)
+
+
+def test_as_many_joints_of_another_robot_are_refused():
+    joints = ("x", "y", "theta", *(f"joint_{number}" for number in range(1, 7)))
+    other = SimpleNamespace(joints=joints, description=SimpleNamespace(joints=joints, name="other"))
+    assert CONTROLLERS["rl"].fits(MODEL.description)
+    assert not CONTROLLERS["rl"].fits(other.description)
+    with pytest.raises(
+        HandrailError, match="robot other of the learnt baseline: expected the joints x, y, theta, "
+    ):
+        check_robot(other)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
