@@ -125,8 +125,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         usual = asdict(MpcSettings.of(model.description.world.scale))
         settings = decoded(usual | self.settings, MpcSettings, f"{NAME} settings")
         settings.check_period(1.0 / self.fps, f"fps of {NAME}")
-        centring = narrow_joint_centring(channels, model.description.limits)
-        self._mpc = MaskedMpc(model, settings, centring)
+        self._mpc = MaskedMpc(model, settings, narrow_joint_centring(channels, model.description.limits))
         self.reset()
 
     def reset(self) -> None:

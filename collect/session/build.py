@@ -148,13 +148,9 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
 
 def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:
     """Return the modes that a person can change to, by name: all for the robot, and that of the settings."""
-    fit = fitting(MODES, len(env.model.description.hands))
-    known = [
-        build_mode(replace(config, mode=name, mask=""), env.model)
-        for name, mode in fit.items()
-        if not _reason_against(mode, env.model)
-    ]
-    return {mode.name: mode for mode in (build_mode(config, env.model), *known)}
+    fit = fitting(MODES, len(env.model.description.hands)).values()
+    rest = (replace(config, mode=each.name, mask="") for each in fit if not _reason_against(each, env.model))
+    return {mode.name: mode for mode in (build_mode(each, env.model) for each in (config, *rest))}
 
 
 def _reason_against(mode: TeleopMode, model: RobotModel) -> str:

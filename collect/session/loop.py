@@ -121,8 +121,7 @@ class EpisodeLoop:
     @property
     def rests(self) -> bool:
         """Whether the robot was at rest at the last look, as it was told."""
-        commanded = self.now.view.state.commanded
-        return commanded is not None and not commanded.any()
+        return not self.now.view.state.commanded.any()
 
     def begin(self, seed: int | None) -> View:
         """Begin an episode; the same seed begins the same one.
@@ -237,14 +236,11 @@ class EpisodeLoop:
         if found != wanted:
             name = type(self._controller).__name__
             raise HandrailError(f"controller {name}: expected {wanted}, got {found}")
-        grippers = command.grippers
-        valid = all(map(math.isfinite, grippers)) or all(map(math.isnan, grippers))
+        valid = all(map(math.isfinite, command.grippers)) or all(map(math.isnan, command.grippers))
         if valid and are_finite(command.velocities.ravel()):
             return command
         failed = replace(command.diagnostics, status=Status.SOLVER_FAILED)
-        return Command(
-            np.zeros((2, n)), self.control_period, grippers=(math.nan,) * hands, diagnostics=failed
-        )
+        return Command(np.zeros((2, n)), self.control_period, 0.0, (math.nan,) * hands, failed)
 
     @property
     def _goal(self) -> Pose | None:

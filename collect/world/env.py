@@ -8,7 +8,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.world.looks import Looks
@@ -17,8 +16,10 @@ from handrail.collect.world.plant import Plant
 from handrail.collect.world.rendering import Painter
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Start, Task, TaskState, Verdict
-from handrail.controllers.errors import HandrailError, check_known, unknown_name
+from handrail.controllers.arrays import FloatArray, are_finite, frozen
+from handrail.controllers.errors import HandrailError, check_known, shown, unknown_name
 from handrail.controllers.interface.controller import State
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.description import SCENE_CAMERA
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
@@ -77,7 +78,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise HandrailError(f"fps {fps}: expected 10 to 100 steps a second")
         if render_mode not in (None, "rgb_array"):
             raise unknown_name("render mode", render_mode, ("rgb_array",))
-        self.task: Task = load_env_creator(task)() if isinstance(task, str) else task  # pyright: ignore
+        self.task: Task = resolved(task, f"task {task}")() if isinstance(task, str) else task
         self.model: RobotModel = robot if isinstance(robot, RobotModel) else load_model(robot)
         self.fps, self.period, self.real = fps, 1.0 / fps, real
         self.cameras, self.image_size = tuple(cameras), image_size
@@ -177,8 +178,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _by_hand(self, grip: tuple[float | None, ...]) -> tuple[float | None, ...]:
         """Return the width that each hand holds, of widths that begin with the hand that does the task."""
-        hands, first = range(len(self.model.description.hands)), self.model.number
-        order = [first, *(hand for hand in hands if hand != first)]
+        hands = range(len(self.model.description.hands))
+        order = sorted(hands, key=lambda hand: hand != self.model.number)
         held = dict(zip(order, grip, strict=False))
         return tuple(held.get(hand) for hand in hands)
 
@@ -213,11 +214,19 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         }
         observation: Observation = {
             "agent_pos": self._agent.read(self.seen[0], state.tools, state.openings),
-            "environment_state": bounded(self.task.features(state)),
+            "environment_state": bounded(self._features(state)),
         }
         if self.cameras:
             observation["pixels"] = self.pictures(self.cameras)
         return observation, info
+
+    def _features(self, state: TaskState) -> FloatArray:
+        """Return the task's features, checked; of unstable physics or a real robot they may be NaN."""
+        where, count = f"task {type(self.task).__name__}", len(self.state_names)
+        found = frozen(self.task.features(state), what=f"features of {where}")
+        if found.shape != (count,) or not (self.real or not state.stable or are_finite(found)):
+            raise HandrailError(f"{where}: expected {count} finite numbers of features, got {shown(found)}")
+        return found
 
     def pictures(self, cameras: tuple[str, ...]) -> dict[str, NDArray[np.uint8]]:
         """Return what cameras see now, `image_size` each; a simulation without any needs a `render_mode`."""

@@ -149,7 +149,7 @@ class Task(ABC):
         """Return the beginning of an episode."""
 
     def features(self, state: TaskState) -> FloatArray:
-        """Return the `environment_state`, (k,), in [m], wxyz quaternions."""
+        """Return the `environment_state`, (k,), in [m], wxyz quaternions; finite, and cut to ± 100."""
         return np.zeros(0)
 
     @abstractmethod

@@ -11,6 +11,8 @@ import pytest
 from collect_helpers import action, environment
 from gymnasium.utils.env_checker import check_env
 
+from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.ideal_robot import IdealRobot
 from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.errors import HandrailError
 
@@ -101,10 +103,21 @@ def test_names_match_the_numbers():
     ],
 )
 def test_wrong_options_are_named(options, message):
-    from handrail.collect.world.env import HandrailEnv
-
     with pytest.raises(HandrailError, match=message):
         HandrailEnv("handrail.collect.world.tasks.reach:Reach", **options).reset(seed=0)
+
+
+@pytest.mark.parametrize("wrong", ["nowhere:Foo", "reach", "math:Foo"])
+def test_a_task_that_cannot_be_imported_is_one_line(wrong):
+    with pytest.raises(HandrailError, match=f"task {wrong}: cannot import it: "):
+        HandrailEnv(wrong)
+
+
+@pytest.mark.parametrize("features", [np.zeros(4), np.zeros((1, 7)), [0.0, np.nan, *[0.0] * 5], [np.inf] * 7])
+def test_features_that_are_not_as_many_finite_numbers_are_refused_in_one_line(monkeypatch, features):
+    monkeypatch.setattr(Reach, "features", lambda task, state: features)
+    with pytest.raises(HandrailError, match="task Reach: expected 7 finite numbers of features, got "):
+        HandrailEnv(Reach(), plant=IdealRobot).reset(seed=0)
 
 
 def test_before_reset_there_is_nothing_to_see():
