@@ -1,6 +1,7 @@
 """Things of one kind by name: built in, of an installed package, or `module:name` of the command line."""
 
 import importlib
+import logging
 import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -15,8 +16,17 @@ _REFERENCE = re.compile(r"[\w.]+:\w+")
 
 
 def fitting[Spec: Any](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]:
-    """Return those of some specs that a robot with so many hands can do, by name."""
-    return {name: spec for name, spec in specs.items() if spec.hands <= hands}
+    """Return those of some specs that a robot with so many hands can do, by name, if they can be imported."""
+    return {name: spec for name, spec in importable(specs) if spec.hands <= hands}
+
+
+def importable[Spec: Any](specs: Mapping[str, Spec]) -> Iterator[tuple[str, Spec]]:
+    """Yield specs with their names; one that an installed package lacks is left out with a warning."""
+    for name in specs:
+        try:
+            yield name, specs[name]
+        except HandrailError as error:
+            logging.getLogger(__name__).warning("%s; it is left out", error)
 
 
 class Registry[Spec: Any](Mapping[str, Spec]):

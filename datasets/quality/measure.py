@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from handrail.controllers.errors import restated
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.episode_set import EpisodeSet, frames_of
 from handrail.datasets.quality.metric import Metric
@@ -103,10 +104,9 @@ def _share_scales(groups: Sequence[EpisodeSet], margin: float) -> None:
     families: list[list[EpisodeSet]] = []
     for group in groups:
         fitting = (family for family in families if not why_not("scale", family[0], group))
-        family = next(fitting, None)
-        if family is None:
-            families.append(family := [])
+        family = next(fitting, [])
         family.append(group)
+        families += [family] if len(family) == 1 else []
     for family in families:
         scale, lengths = Scale(margin), [[each.count for each in group.episodes] for group in family]
         most = min(FRAMES, *map(sum, lengths))
@@ -133,10 +133,11 @@ def _measure(metric: Metric, episode: Demonstration, where: Sequence[tuple[Episo
     for group, place in where:
         key = group.scale if metric.needs == "scale" else None
         if key not in known:
-            try:
-                known[key] = metric.measure(episode, group.scale)
-            except DoesNotApply as error:
-                known[key] = str(error)
+            with restated(f"metric {metric.name} of episode {episode.number}"):
+                try:
+                    known[key] = float(metric.measure(episode, group.scale))
+                except DoesNotApply as error:
+                    known[key] = str(error)
         group.found.setdefault(metric.name, [np.nan] * len(group.episodes))[place] = known[key]
 
 
