@@ -27,6 +27,7 @@ class TeleopMode:
     operator then leaves to them."""
     hands: int = 1  # how many hands a robot needs for it
     module: str = ""  # that has to be installed besides
+    extra: str = ""  # of Handrail, which has it
 
     @property
     def available(self) -> bool:
@@ -184,6 +185,7 @@ MODES = Registry(
             "handrail.collect.world.mink:MINK",
             "steer the hand; whole-body inverse kinematics that keeps distances: ee without horizon",
             module="mink",
+            extra="profile",
         ),
         TeleopMode(
             "ee_one_stage", always("hand"), "mpc_one_stage", "steer the hand: ee with a horizon of one stage"

@@ -21,7 +21,7 @@ from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Task
 from handrail.collect.world.tasks.catalogue import TASKS, check_robot
 from handrail.controllers.baselines.catalogue import CONTROLLERS
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, check_installed
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
@@ -139,6 +139,8 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
     if config.mask:
         own = mode_of_mask(config.mask, Channels.of(model.description), mode.controller)
         mode = replace(own, task_objectives=mode.task_objectives)
+    if mode.extra:
+        check_installed(f"mode {mode.name}", (mode.module,), mode.extra)
     if reason := _reason_against(mode, model):
         raise HandrailError(f"mode {mode.name}: {reason}")
     if not (CONTROLLERS.find(mode.controller).objectives and mode.task_objectives):

@@ -14,7 +14,7 @@ from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, REST, asking, intent, rol
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.session.build import build_controller, build_modes
+from handrail.collect.session.build import build_controller, build_mode, build_modes
 from handrail.collect.world.mink import MINK
 from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.baselines.arm_completion import (
@@ -231,6 +231,8 @@ def test_where_mink_is_missing_a_line_says_so_and_people_are_not_offered_it(monk
     monkeypatch.setitem(sys.modules, "mink", None)
     with pytest.raises(HandrailError, match=r"^differential IK: expected mink, found none; .*profile"):
         build_controller(MODES["ee_mink"], MODEL, 20.0)
+    with pytest.raises(HandrailError, match=r"^mode ee_mink: expected mink, found none; .*'\.\[profile\]'$"):
+        build_mode(SessionConfig(mode="ee_mink"), MODEL)
     env = SimpleNamespace(model=MODEL)
     offered = build_modes(SessionConfig(task="reach"), env)  # type: ignore[arg-type]
     assert "ee_mink" not in offered
