@@ -15,7 +15,8 @@ from handrail.controllers.ocp.residuals import StageResiduals
 
 NOTHING_ACTIVE = np.arange(SLACKS)  # only the slacks are at rest: none is negative
 _PHASES = ("distances", "residuals", "solve")
-_WORK = 2e4  # of all QPs of an update for each variable, counted as core/active_set.c does
+_WORK = 2e5  # of all QPs of an update for each variable, counted as core/active_set.c does
+_ROUNDING = 2e-5  # of a joint's range, that the QP leaves
 
 
 class RealTimeSolver:
@@ -51,13 +52,14 @@ class RealTimeSolver:
         core.fields.active_rows, core.fields.work = len(active), _WORK * core.fields.M
         functions().solve_update(core, problem.collision.memory)
         problem.collision.check()
-        slacks = core.slacks.tolist()
+        slacks, half = core.slacks.tolist(), core.joint_scale[0]
+        excess = float((np.abs(core.path[1:] - core.lower - half) / half).max()) - 1.0 - _ROUNDING
         return Plan(
             q=frozen(core.path),
             v=frozen(core.speeds),
             u=frozen(core.u),
             collision_slack=max(slacks[:LIMITS]),
-            limit_slack=slacks[LIMITS],
+            limit_slack=max(slacks[LIMITS], excess),  # the plan may not keep all rows where the work ended
             distances=frozen(core.distances),
             solved=bool(core.fields.solved),
             iterations=core.fields.changes,

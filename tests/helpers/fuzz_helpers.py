@@ -175,6 +175,34 @@ class RudePair:
         return Intents.of(sources, first.grippers, first)
 
 
+@dataclass
+class SolverRecord:
+    """How the plans of a controller fared."""
+
+    updates: int = 0
+    spent: int = 0  # updates whose work ended before all rows were met
+    excess: float = 0.0  # over a position limit, relative to half its range, beyond what the plan says
+
+
+@contextmanager
+def watching(controller: MaskedMpc) -> Iterator[SolverRecord]:
+    """Look at every plan."""
+    record, solver, limits = SolverRecord(), controller.solver, controller.model.description.limits
+    honest, half = solver.solve, 0.5 * (limits.position_upper - limits.position_lower)
+
+    def solve(problem: Problem, guess: FloatArray, active: IntArray = NOTHING_ACTIVE) -> Plan:
+        plan = honest(problem, guess, active)
+        share = np.abs(plan.q[1:] - limits.position_lower - half) / half - 1.0
+        record.updates += 1
+        record.spent += solver._core.fields.work <= 0.0
+        record.excess = max(record.excess, float(share.max()) - plan.limit_slack)
+        return plan
+
+    solver.solve = solve
+    yield record
+    solver.solve = honest
+
+
 @contextmanager
 def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
     """Let the solver fail at random, now and then for a while."""

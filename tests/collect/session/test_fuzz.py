@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from fuzz_helpers import RudeOperator, RudePair, failing, run
+from fuzz_helpers import RudeOperator, RudePair, failing, run, watching
 
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.mpc.safety_filter import safety_filter
@@ -14,6 +14,7 @@ from handrail.controllers.robot.description import robot_names
 from handrail.controllers.robot.model import load_model
 
 EXCESS = 1e-6  # of a limit, relative, that is rounding
+SPENT = 0.05  # of the updates, whose work may end before the plan keeps all limits
 
 
 def check(
@@ -22,7 +23,7 @@ def check(
     """Run seeds; the robot touches neither itself nor what stands, keeps its limits, and gets somewhere."""
     model, results = load_model(robot), {}
     controller = make(model)
-    with single_threaded():
+    with single_threaded(), watching(controller) as record:
         for seed in seeds:
             with failing(controller, seed, failures):
                 results[seed] = run(model, controller, seed, seconds, movers, operator=operator)
@@ -32,6 +33,8 @@ def check(
     assert not {seed: r.standing for seed, r in results.items() if r.standing}
     assert max(result.velocity_excess for result in results.values()) < EXCESS
     assert max(result.acceleration_excess for result in results.values()) < EXCESS
+    assert record.excess <= 1e-4  # a plan says how far it exceeds a limit
+    assert record.spent <= SPENT * record.updates, record
     least = 0.3 * seconds * model.description.world.scale
     assert travelled > least, f"travelled {travelled} m: a robot that freezes is safe too"
     return statuses, [seed for seed, result in results.items() if result.moving]
