@@ -36,9 +36,9 @@ static void check_pair(Scene *s, int64_t pair, double time) {
 
 static void check_joints(Scene *s, const double *begin, const double *q, double time) {
   for (int64_t j = 0; j < s->n; j++) {
-    double room = SMALLER(q[j] - s->lower[j], s->upper[j] - q[j]) + BEYOND;
-    double before = SMALLER(0.0, SMALLER(begin[j] - s->lower[j], s->upper[j] - begin[j]));
-    if (!(room >= 0.0)) find(s, time, before - room, 0.0);
+    double room = SMALLER(q[j] - s->lower[j], s->upper[j] - q[j]);
+    double least = SMALLER(-BEYOND, SMALLER(begin[j] - s->lower[j], s->upper[j] - begin[j]));
+    if (!(room >= least)) find(s, time, least - room, 0.0);
   }
 }
 

@@ -89,6 +89,7 @@ typedef struct {
   double *v;                 /* (n,) */
   double *sent;              /* (n,) velocity with which the plan has to begin */
   double *margins;           /* (P,) */
+  double *shift;             /* (N, n) of the joints' ranges, where one is beyond now */
   double *reference;         /* (N, R) */
   double *weights;           /* (N, R) */
   double *constant;          /* (M, B) Hessian of the affine rows under these weights */

@@ -1,7 +1,7 @@
 /* The inequality rows  c_p' s - a_p sigma <= b_p  of one update, and which of them a point breaks.
 
    A row has a number, the same in every update: first the slacks (sigma >= 0), then the limits of the joints
-   (+-x <= 1 + a sigma, x of (q, v, u) relative to half of its range), then those of the distances,
+   (+-x <= 1 + a sigma, x of (q, v, u) relative to half of its range, which comes back with a joint beyond it), then those of the distances,
    first + 1000 pair + node. Its place is where it stands in this update: that number, or the first + its index. */
 #include "core.h"
 #include "vector.h"
@@ -27,7 +27,8 @@ void take_joints(Core *c, const double *q, const double *v, const double *u) {
   for (int64_t k = 0; k < c->N; k++)
     for (int64_t j = 0; j < n; j++) {
       double *value = c->joint_value + 3 * k * n + j;
-      value[0] = (q[(k + 1) * n + j] - 0.5 * (c->upper[j] + c->lower[j])) / c->joint_scale[j];
+      double middle = 0.5 * (c->upper[j] + c->lower[j]) + c->shift[k * n + j];
+      value[0] = (q[(k + 1) * n + j] - middle) / c->joint_scale[j];
       value[n] = v[(k + 1) * n + j] / c->joint_scale[n + j];
       value[2 * n] = u[k * n + j] / c->joint_scale[2 * n + j];
       c->broken |= LARGER(fabs(value[0]), fabs(value[n])) > 1.0;

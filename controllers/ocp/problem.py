@@ -6,8 +6,12 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.core.library import constant
 from handrail.controllers.ocp.motion import rollout
 from handrail.controllers.robot.parts import Limits
+
+RECOVERY = constant("RECOVERY")  # of what is missing at first, the share that may be left after each node
+_AT_END = 1e-3  # a joint beyond its range by less is at its end, by the solver's rounding [m, rad]
 
 
 class Problem(NamedTuple):
@@ -39,9 +43,18 @@ class Problem(NamedTuple):
         return len(self.reference)
 
     @property
-    def active_within(self) -> FloatArray:
-        """Distance below which each pair enters the problem, (P,) [m]."""
-        return self.margins + self.activation_distance
+    def range_shift(self) -> FloatArray:
+        """Shift of the joints' ranges at the nodes after now, (N, n): 0 for a joint that is within its own.
+
+        The range of one that is beyond comes back with it: by a share of the way at every node, or else as
+        fast as the joint can. Then that joint needs no slack, which would let all others leave their range.
+        """
+        limits, nodes = self.limits, np.arange(self.horizon + 1)[:, None]
+        excess = self.q - np.clip(self.q, limits.position_lower, limits.position_upper)
+        away = np.sign(excess) * (np.abs(excess) > _AT_END)
+        speeds = np.maximum(away * self.v - self.dt * nodes * limits.acceleration, -limits.velocity)
+        ways = np.cumsum(0.5 * self.dt * (speeds[:-1] + speeds[1:]), axis=0)
+        return away * np.maximum(np.abs(excess) + ways, np.abs(excess) * RECOVERY ** nodes[1:])
 
     def rollout(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities at the N + 1 nodes under accelerations u, (N, n)."""

@@ -19,10 +19,10 @@ from handrail.controllers.core.library import constant
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interrupts import interrupted
 from handrail.controllers.ocp.motion import Nodes, nodes_of
-from handrail.controllers.ocp.problem import Plan, Problem
+from handrail.controllers.ocp.problem import RECOVERY, Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 
-RECOVERY, VELOCITY_SLACK = constant("RECOVERY"), constant("VELOCITY_SLACK")
+VELOCITY_SLACK = constant("VELOCITY_SLACK")
 _ROUNDS = 50  # of linearising the distances, at most
 _TOLERANCE = 1e-5  # promised improvement of the cost, relative, at which it stops
 _NOISE = 1e-9  # of the cost: what the inner solver leaves
@@ -142,7 +142,8 @@ class ConvergedSolver:
         u = np.clip(u, -problem.limits.acceleration, problem.limits.acceleration)
         q, v = problem.rollout(u)
         nodes = _nodes(problem, q, v)
-        found = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
+        within = problem.margins + problem.activation_distance
+        found = problem.collision.distances(nodes.q, within, nodes.times)
         node, pair = near = found.near[found.near[:, 0] > 0].T
         matrix = np.zeros((_BLOCK * -(-len(node) // _BLOCK), u.size + SLACKS))
         left = np.ones(len(matrix))
@@ -193,8 +194,9 @@ class ConvergedSolver:
         limits, u = problem.limits, here.u
         q, v = problem.rollout(u)
         half = 0.5 * (limits.position_upper - limits.position_lower)
-        upper = np.tile(np.append(limits.position_upper, limits.velocity), len(u))
-        lower = np.tile(np.append(limits.position_lower, -limits.velocity), len(u))
+        shift = np.hstack([problem.range_shift, np.zeros_like(u)])
+        upper = (np.append(limits.position_upper, limits.velocity) + shift).ravel()
+        lower = (np.append(limits.position_lower, -limits.velocity) + shift).ravel()
         least, most = np.maximum(-limits.acceleration, u - trust), np.minimum(limits.acceleration, u + trust)
         free = np.full(len(upper), np.inf)
         guess = here.exact.slack + 1e-3  # a little inside of the bounds
@@ -277,10 +279,9 @@ def _distances_left(problem: Problem, nodes: Nodes, values: FloatArray | None = 
 
 def _limit_slack(problem: Problem, q: FloatArray, v: FloatArray) -> float:
     """Return the slack that the position and velocity limits after now need, relative to half the range."""
-    limits = problem.limits
-    middle = 0.5 * (limits.position_upper + limits.position_lower)
+    limits, place = problem.limits, q[1:] - problem.range_shift
     half = 0.5 * (limits.position_upper - limits.position_lower)
-    position = float(np.abs((q[1:] - middle) / half).max()) - 1.0
+    position = float((np.abs(place - limits.position_lower - half) / half).max()) - 1.0
     velocity = float(np.abs(v[1:] / limits.velocity).max()) - 1.0
     return max(position, velocity / VELOCITY_SLACK, 0.0)
 

@@ -83,6 +83,7 @@ class RealTimeSolver:
             self._collision, self._weights = problem.collision, None
         core.q[:], core.v[:], core.sent[:] = problem.q, problem.v, problem.sent
         core.margins[:], core.reference[:], core.guess[:] = problem.margins, problem.reference, guess
+        core.shift[:] = problem.range_shift
         self._residuals.set_parameters(problem.parameters)
         if self._weights is not problem.weights:
             core.weights[:] = self._weights = problem.weights

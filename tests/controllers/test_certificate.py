@@ -92,3 +92,17 @@ def test_a_joint_that_sags_past_its_end_does_not_hold_the_others():
         way = 0.5 * period * (v + command.velocity(period))
         q, expected, v = q + way, expected + way, command.velocity(period)
     assert expected[3] - model.description.home[3] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("excess", "way", "hard"), [(0.05, 0.005, 0.005), (0.0, 0.005, 0.0), (0.05, -0.02, 0.0)]
+)
+def test_a_joint_beyond_its_range_goes_no_farther(excess, way, hard):
+    """Not even by what one that is within may: each update would add that anew."""
+    q, stop = np.array(HOME), np.zeros((3, MODEL.size))
+    q[1] = MODEL.description.limits.position_upper[1] + excess
+    stop[1, 1] = way / 0.1
+    collision = CollisionModel(MODEL)
+    certificate = Certificate(collision, np.zeros(collision.size), span=1.0)
+    violation = certificate.violation(Trajectory(stop, 0.1), q, collision.values(q[None])[0])
+    assert violation.hard == pytest.approx(hard)
