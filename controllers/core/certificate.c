@@ -9,6 +9,7 @@
 #define ERROR 1e-3       /* of signed distances, that is no loss [m] */
 #define HARD_ERROR 1e-4  /* the same where a thing that stands is nearer than its hard limit [m] */
 #define HARD 0.5         /* hard limit of the robot with itself and with what stands, as a share of the least */
+#define UNFOLDING 0.005  /* that a pair of own shapes may come nearer while others overlap [m] */
 #define BEYOND 0.01      /* of its range that a joint may come to rest [m, rad] */
 #define MOST_SAMPLES 128 /* of a stretch */
 #define SPACING 0.5      /* way of a pair between two samples, as a share of its least distance */
@@ -28,8 +29,19 @@ static void find(Scene *s, double time, double hard, double all) {
   s->violation[1] = larger_or_nan(s->violation[1], larger_or_nan(all, hard));
 }
 
+/* The smallest distance between the robot's own shapes at the start, 0 where none overlap. */
+static double deepest_own(const Scene *s) {
+  double deepest = 0.0;
+  for (int64_t p = 0; p < s->P; p++)
+    if (s->slack[p] == OWN) deepest = SMALLER(deepest, s->start_distances[p]);
+  return deepest;
+}
+
+/* A robot that overlaps itself (an arm folded by hand) has to unfold: its shapes are larger than it is, and another
+   pair of them that came no nearer at all could hold it for good. None comes nearer than the deepest is. */
 static void check_pair(Scene *s, int64_t pair, double time) {
   double least = s->least[pair], now = s->start_distances[pair], distance = s->here[pair];
+  if (s->slack[pair] == OWN && s->deepest < 0.0) now = SMALLER(now, LARGER(s->deepest, now - UNFOLDING));
   double hard = SMALLER(HARD * least, now - HARD_ERROR) - distance;
   find(s, time, s->slack[pair] == MOVING ? 0.0 : hard, SMALLER(least, now - ERROR) - distance);
 }
@@ -128,6 +140,7 @@ void motion_violation(Scene *s, int64_t count, const double *velocities, double 
   for (int64_t p = 0; p < s->P; p++) moving |= s->speed[p] > 0.0;
   double wait = moving ? LARGER(span - time, 0.0) : 0.0;
   s->violation[0] = s->violation[1] = 0.0, s->violation[2] = INFINITY;
+  s->deepest = deepest_own(s);
   for (int lagging = 0; lagging <= (lag ? 1 : 0); lagging++) {
     memcpy(s->here, s->start_distances, s->P * sizeof(double));
     memcpy(part.q, s->start, n * sizeof(double));

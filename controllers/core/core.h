@@ -53,6 +53,7 @@ typedef struct {
   double *least;             /* (P,) distances that a motion has to keep, */
   double *start;             /* (n,) from here, */
   double *start_distances;   /* (P,) where they are these */
+  double deepest;            /* smallest of the robot's own, 0 where none overlap */
   int64_t *close;            /* (P,) pairs that may come too near on the way */
   double *violation;         /* (3,) how far a motion falls short of safety, and from when on [s] */
   int (*measure)(int64_t pair, const double *placements, double *witness); /* of cores that meet; 0: measured */

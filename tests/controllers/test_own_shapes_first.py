@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
-from ideal_robot import HOME, LIMITS, MODEL, Robot, asking
+from ideal_robot import HOME, LIMITS, MODEL, PERIOD, Robot, asking
 
 from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.safety.backup import Backup, Situation
 from handrail.controllers.safety.certificate import Violation
@@ -51,3 +53,22 @@ def test_of_two_ways_that_are_not_safe_the_one_is_taken_that_keeps_from_itself(h
     followed = Trajectory(backup.limiter.to_rest(np.stack([moving, moving]), backup.dt), backup.dt)
     way = backup.choose(Situation(HOME, moving, np.zeros(OWN), followed, 0.0), None, halt)
     assert way.violation == (0.0, 0.05, 0.0)
+
+
+@pytest.mark.parametrize("pose", [(-1.55, 1.5, 1.5), (-1.65, 1.6, 1.3)])
+def test_an_arm_folded_onto_itself_unfolds(pose):
+    """Its shapes overlap a little; on the way out other pairs come a little nearer, none so deep."""
+    model = load_model("lekiwi")
+    home, mpc = model.description.home, MaskedMpc(model)
+    q, v = np.array(home), np.zeros(model.size)
+    q[4:7] = pose
+    own = mpc.loop.surroundings.collision
+    deepest = own.values(q[None])[0].min()
+    assert deepest < 0.0
+    mask, values = mpc.channels.mask("joint"), np.zeros(mpc.channels.size)
+    for step in range(200):
+        values[mpc.channels.joint_slice] = np.clip(2.0 * (home - q), -0.5, 0.5)
+        command = mpc.update(State(q, v, step * PERIOD, v), Intent(values, mask, time=step * PERIOD))
+        q, v = q + 0.5 * PERIOD * (v + command.velocity(PERIOD)), command.velocity(PERIOD)
+        assert own.values(q[None])[0].min() > deepest - 1e-3
+    np.testing.assert_allclose(q, home, atol=0.02)
