@@ -142,12 +142,15 @@ class ShapePairs:
         try:
             given = np.ctypeslib.as_array(placements, (2, 12))
             poses = [coal.Transform3s(each[:9].reshape(3, 3).copy(), each[9:].copy()) for each in given]
-            first, second = (coal_shape(self._placed[index].shape) for index in self._pair(pair))
+            first, second = (coal_shape(self._placed[self._index[name]].shape) for name in self.names[pair])
             found = coal.DistanceResult()
             coal.distance(first, poses[0], second, poses[1], coal.DistanceRequest(), found)
-            points = found.getNearestPoint1(), found.getNearestPoint2()
+            normal, points = found.normal, (found.getNearestPoint1(), found.getNearestPoint2())
+            if np.linalg.norm(normal) < 0.5:  # coal knows none on an axis; any across it leads out
+                normal = poses[isinstance(first, coal.Sphere)].getRotation()[:, 0]
+                points = poses[0].getTranslation() + np.outer([0.0, found.min_distance], normal)
             said = np.ctypeslib.as_array(witness, (9,))
-            said[:] = np.concatenate([found.normal, *points])
+            said[:] = np.concatenate([normal, *points])
             if not np.isfinite(said).all():
                 raise HandrailError(
                     f"distance of {' and '.join(self.names[pair])}: expected numbers, got NaN"
@@ -156,9 +159,6 @@ class ShapePairs:
             self.failure = error
             return 1
         return 0
-
-    def _pair(self, row: int) -> tuple[int, int]:
-        return int(self.memory.first[row]), int(self.memory.second[row])
 
     def _bound_motions(self, rows: Iterable[int]) -> None:
         """Write the motion bounds of some pairs.

@@ -46,6 +46,26 @@ def test_a_distance_that_is_no_number_is_an_error(monkeypatch):
         collision.values(MODEL.description.home[None])
 
 
+@pytest.mark.parametrize("kind", ["sphere", "capsule", "cylinder"])
+@pytest.mark.parametrize("held", ["sphere", "capsule", "cylinder"])
+def test_shapes_on_one_axis_overlap_as_much_as_beside_it(held, kind):
+    """Law: the value is continuous there, and the gradient leads out."""
+    sizes = {"sphere": [0.05], "capsule": [0.05, 0.3], "cylinder": [0.05, 0.3]}
+    q, found = MODEL.description.home, []
+    pose = MODEL.pose(q)
+    for aside in (0.0, 1e-5):
+        place = pose.position + aside * pose.rotation[:, 0]
+        cup = Obstacle("cup", Shape(held, sizes[held]), [0.0, 0.0, 0.0], frame="tool")
+        post = Obstacle("post", Shape(kind, sizes[kind]), place, pose.rotation)
+        collision = CollisionModel(MODEL, (cup, post))
+        row, distances = collision.pairs.index(("cup", "post")), collision.distances(q[None])
+        gradient = distances.gradients[distances.near[:, 1] == row]
+        found.append((distances.values[0, row], np.linalg.norm(gradient)))
+    assert found[0][0] == pytest.approx(found[1][0], abs=1e-3)
+    assert found[0][0] < -0.05
+    assert found[0][1] > 0.3
+
+
 def test_gradients_are_the_derivatives_of_the_distances():
     rng = np.random.default_rng(0)
     collision, h = CollisionModel(MODEL, scene(rng)), 1e-3
