@@ -34,7 +34,8 @@ class MinkController(TwistController):
 
     `min ‖J Δq − twist Δt‖² + ‖C Δq‖² + c² ‖q_home − q − Δq‖²` subject to velocity and position limits and,
     for every pair of shapes, `−Δd ≤ approach (d − margin)`; then the limits of acceleration, which mink does
-    not know, cut it. Without a solution the robot brakes.
+    not know, cut it. Without a solution the robot brakes. It follows neither that an obstacle turns nor how a
+    held thing slipped.
 
     Args:
         model: of the robot.

@@ -152,9 +152,8 @@ class ShapePairs:
             said = np.ctypeslib.as_array(witness, (9,))
             said[:] = np.concatenate([normal, *points])
             if not np.isfinite(said).all():
-                raise HandrailError(
-                    f"distance of {' and '.join(self.names[pair])}: expected numbers, got NaN"
-                )
+                names = " and ".join(self.names[pair])
+                raise HandrailError(f"distance of {names}: expected numbers, got NaN")
         except BaseException as error:  # C cannot pass it on
             self.failure = error
             return 1

@@ -45,7 +45,8 @@ class MpcSettings:
     it, relative to the velocity limit; more than the measured velocity's noise."""
 
     length: Positive = 1.0
-    """The length that weighs as much as one radian [m]: weights of translations are divided by its square."""
+    """The length that weighs as much as one radian [m]: weights of translations are divided by its square;
+    those of the terminal velocity and of the posture are not."""
 
     @classmethod
     def of(cls, scale: float, **values: float) -> Self:
