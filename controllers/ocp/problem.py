@@ -18,9 +18,9 @@ class Problem(NamedTuple):
     """`min Σ_k ½ ‖r(q_k, v_k, u_k; p) - ref_k‖²_W_k + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)` over N stages.
 
     Dynamics: `v_k = v_{k-1} + dt u_k`, `q_k = q_{k-1} + dt v_{k-1} + ½ dt² u_k`. Hard: `|u| ≤ a_max`.
-    Soft, each kind with a slack of its own (slacks.py): velocity and position limits, and for every pair
-    `d_p(q_k) ≥ margin_p`. The terminal set X_f asks the same of the stop from the last node:
-    `q_N + ½ v_N |v_N| / a_max`, half way and at rest.
+    Soft, each kind with a slack of its own (slacks.py): velocity limits, position limits, shifted where a
+    joint is beyond them (`range_shift`), and for every pair `d_p(q_k) ≥ margin_p`. The terminal set X_f
+    asks the same of the stop from the last node: `q_N + ½ v_N |v_N| / a_max`, half way and at rest.
     """
 
     q: FloatArray  # position now, (n,)
