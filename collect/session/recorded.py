@@ -38,17 +38,23 @@ def recorded_settings(row: Mapping[str, Any], said: Collection[str] = ()) -> Ses
         said: the names of the command line; others that are `module:name` are refused. A description file
             of a robot takes the place of the recorded one.
     """
+    config = unchecked_settings(row)
+    if config.robot.endswith(_FILE):
+        config = replace(config, robot=next((name for name in said if name.endswith(_FILE)), config.robot))
+    for name, registry in _NAMES.items():
+        registry.admit(getattr(config, name), said)
+    config.check()
+    return config
+
+
+def unchecked_settings(row: Mapping[str, Any]) -> SessionConfig:
+    """Return the settings of an episode whatever they name; nothing of it may be imported unless admitted."""
     content = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
     if isinstance(content, dict) and isinstance(content.get("human"), dict):
         content["human"] = {name: value for name, value in content["human"].items() if name not in _GONE}
     config = decoded(content, SessionConfig, _WHERE)
     if missing := {"task", "robot"} - set(content):
         raise HandrailError(f"{_WHERE}: expected entries task and robot, found no {', '.join(missing)}")
-    if config.robot.endswith(_FILE):
-        config = replace(config, robot=next((name for name in said if name.endswith(_FILE)), config.robot))
-    for name, registry in _NAMES.items():
-        registry.admit(getattr(config, name), said)
-    config.check()
     return config
 
 

@@ -33,10 +33,10 @@ from handrail.policies.imitation.interface.checkpoint import (
     NAME,
     PolicyMeta,
     model_folder,
-    origin_of,
     read_meta,
 )
 from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT, STATE
+from handrail.policies.imitation.interface.origin import origin_of
 from handrail.policies.imitation.interface.trust import check_policy_folder
 
 _TRAINED = "train_config.json"  # of LeRobot's: how a policy was trained, not how it drives
@@ -118,14 +118,14 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     path, step = place / _TRAINED, place.parent.name
     content = load_json(path, "settings of LeRobot") if path.is_file() else {}
     training = check(content, _Trained, repr(str(path)))
-    root, said, fps = Path((training.get("dataset") or {}).get("root") or place), ("", "", ""), config.fps
+    root, fps = Path((training.get("dataset") or {}).get("root") or place), config.fps
+    origin: dict[str, Any] = {"environment": "", "robot": ""}
     with suppress(HandrailError, OSError):  # it need not be here
-        said, fps = origin_of(info := read_info(root), read_episodes(root)), info.fps
+        origin, fps = origin_of(info := read_info(root), read_episodes(root)), info.fps
+    origin["mode"] = config.mode
     return PolicyMeta(
         interface=None,
-        environment=said[0],
-        mode=config.mode,
-        robot=said[2],
+        **origin,
         fps=fps,
         actions="intent" if config.mode else "recorded",
         training_seed=training.get("seed") or 0,

@@ -9,8 +9,7 @@ A checkpoint appears under its name only when it is whole.
 import itertools
 import json
 import os
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,7 +20,6 @@ from handrail.collect.config import FPS_RANGE, MOST_TIME
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.regular_file import is_inside
 from handrail.controllers.typed import Count, Name, NonNegative, Number, decoded
-from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.storage.atomic import remove, sync, write_whole
 from handrail.datasets.storage.strict_json import load_json
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -98,17 +96,6 @@ class PolicyMeta:
     def intent_mode(self) -> str:
         """Teleop mode whose intents it decides on; empty for joint velocities."""
         return self.mode if self.actions == "intent" else ""
-
-
-def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> tuple[str, str, str]:
-    """Return task, mode and robot of episodes: "mixed" of several, "" where they do not say.
-
-    A robot that is the path of a file is called as the dataset calls it.
-    """
-    found = [{str(row.get(name) or "") for row in rows} for name in ("environment", "mode", "robot")]
-    task, mode, robot = (each.pop() if len(each) == 1 else MIXED for each in found)
-    is_name = robot and "/" not in robot and not robot.endswith(".toml")
-    return task, mode, robot if is_name else re.sub(r"[^\w+:,.\- ]", "-", info.robot_type)
 
 
 def read_meta(folder: Path) -> PolicyMeta:

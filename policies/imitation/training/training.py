@@ -2,35 +2,29 @@
 
 import logging
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from lerobot.configs.default import DatasetConfig
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
 
-from handrail.collect.config import SessionConfig
-from handrail.collect.session.build import build_task
-from handrail.collect.session.recorded import COLUMN, recorded_settings
 from handrail.controllers.errors import HandrailError, restated
-from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import decoded
 from handrail.controllers.versions import TRAINING, versions
 from handrail.datasets.storage.atomic import beside, remove
 from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
-    MIXED,
     MODEL,
     PolicyMeta,
     last_checkpoint,
-    origin_of,
     read_meta,
 )
 from handrail.policies.imitation.interface.compute import threads
+from handrail.policies.imitation.interface.origin import origin_of
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
 from handrail.policies.imitation.training.earlier import earlier_policy
@@ -135,11 +129,9 @@ def _is_checkpoint(path: Path) -> bool:
 
 def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> PolicyMeta:
     config, rows = source.config, source.selection.rows
-    recorded = _recorded(rows)
-    hands = {hand_of(each) for each in recorded}
     return PolicyMeta(
         source.interface,
-        *origin_of(source.info, rows),
+        **origin_of(source.info, rows),
         fps=source.info.fps,
         actions=config.actions,
         training_seed=config.seed,
@@ -152,33 +144,9 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> Po
         sizes=resolved(config),
         episodes=tuple(int(row["episode_index"]) for row in rows),
         data=source.digest,
-        time_limit=_time_limit(recorded),
-        hand=hands.pop() if len(hands) == 1 else MIXED * bool(hands),
         cameras=source.encoder.reads.pictures if source.encoder else {},
         validation={str(step): loss for step, loss in losses.items()},
     )
-
-
-def hand_of(config: SessionConfig) -> str:
-    """Return which hand did it; empty of a robot that has one, or that is not there."""
-    with suppress(HandrailError):
-        return config.hand or load_description(config.robot).hands[0].name
-    return ""
-
-
-def _recorded(rows: Sequence[Mapping[str, Any]]) -> list[SessionConfig]:
-    """Return the settings of episodes, each once; none if one does not say."""
-    with suppress(HandrailError):
-        return [recorded_settings(row) for row in {str(row.get(COLUMN)): row for row in rows}.values()]
-    return []
-
-
-def _time_limit(recorded: Sequence[SessionConfig]) -> float:
-    """Return the longest time that episodes were given [s]; 0 for the task's own, or if one does not say."""
-    with suppress(HandrailError):
-        if any(each.time_limit for each in recorded):
-            return float(max(build_task(each).time_limit for each in recorded))
-    return 0.0
 
 
 @contextmanager

@@ -13,8 +13,8 @@ from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.checkpoint import MIXED, PolicyMeta, read_meta, write_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.origin import hand_of
 from handrail.policies.imitation.interface.steps import CompletedRobot, Completion
-from handrail.policies.imitation.training.training import hand_of
 
 TIAGO = load_description("tiago_pro")
 CHANNELS, JOINTS, N = Channels.of(TIAGO), TIAGO.joints, len(TIAGO.joints)

@@ -1,0 +1,44 @@
+"""A policy is evaluated as its demonstrations were made, whichever command trained it and whatever they name."""
+
+import json
+
+import pytest
+from canned import canned, record_by_command
+from training_helpers import tiny
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.session.recorded import settings_json
+from handrail.datasets.reading.reader import read_info
+from handrail.policies.imitation.evaluation.conditions import policy_conditions
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.interface.checkpoint import NAME
+from handrail.policies.imitation.interface.origin import origin_of
+from handrail.policies.imitation.training.training import train
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    words = "--task reach --robot bi_so101 --hand right --time_limit 33 --no_physics"
+    return canned(record_by_command, f"{words} --dataset.num_episodes 1")
+
+
+def test_a_policy_without_our_file_has_the_hand_and_the_time_of_its_demonstrations(recorded, tmp_path):
+    """Law: as `lerobot-train` leaves it, a checkpoint is evaluated as `handrail-train`'s own is."""
+    folder = train(tiny(recorded, tmp_path / "policy", actions="recorded", steps=1))
+    asked, seen = EvaluateConfig(policy=(str(folder),)), []
+    for _ in range(2):
+        (condition,), _ = policy_conditions(asked)
+        meta = condition.checkpoint.meta
+        seen.append((meta.hand, condition.time_limit, meta.robot, meta.environment, meta.fps))
+        (folder / NAME).unlink(missing_ok=True)
+    assert seen == [("right", 33.0, "bi_so101", "reach", 20)] * 2
+
+
+@pytest.mark.parametrize("name", ["", "operator", "task", "mode"])
+def test_hand_and_time_are_read_also_where_a_module_is_named(name, recorded):
+    """Law: nothing is imported for it, and nothing is lost."""
+    said = SessionConfig(task="reach", robot="bi_so101", hand="right", time_limit=77.0)
+    change = {name: "missing_module:SPEC"} if name else {}
+    rows = [{"settings": json.dumps(json.loads(settings_json(said)) | change)}]
+    origin = origin_of(read_info(recorded), rows)
+    assert (origin["hand"], origin["time_limit"]) == ("right", 77.0)
