@@ -12,7 +12,7 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError, restated, unknown_name
 
-_REFERENCE = re.compile(r"[\w.]+:\w+")
+_REFERENCE = re.compile(r"[\w.]+:[^\W\d]\w*")  # `mask:0011` is none
 
 
 def fitting[Spec: Any](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]:

@@ -1,13 +1,15 @@
-"""A policy is evaluated as its demonstrations were made, whichever command trained it and whatever they name."""
+"""A policy is evaluated as its demonstrations were made, whichever command trained it."""
 
 import json
 
 import pytest
 from canned import canned, record_by_command
-from training_helpers import tiny
+from training_helpers import tiny, write_dataset
 
 from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES
 from handrail.collect.session.recorded import settings_json
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import read_info
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -42,3 +44,14 @@ def test_hand_and_time_are_read_also_where_a_module_is_named(name, recorded):
     rows = [{"settings": json.dumps(json.loads(settings_json(said)) | change)}]
     origin = origin_of(read_info(recorded), rows)
     assert (origin["hand"], origin["time_limit"]) == ("right", 77.0)
+
+
+def test_a_policy_of_recordings_with_a_mask_is_evaluated(tmp_path):
+    """Law: the recorded mode, `mask:` and the mask, is no `module:name`."""
+    mode = "mask:000111111000000000"
+    folder = train(tiny(write_dataset(tmp_path / "set", modes=[mode] * 3), tmp_path / "policy", steps=1))
+    (condition,), _ = policy_conditions(EvaluateConfig(policy=(str(folder),)))
+    assert condition.checkpoint.meta.mode == condition.label == mode
+    for refused in ("os:system", "os.path:_x1"):
+        with pytest.raises(HandrailError, match="may not choose what is imported"):
+            MODES.admit(refused, (mode,))
