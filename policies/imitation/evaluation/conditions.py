@@ -98,6 +98,8 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
         if not (robot and task):
             raise HandrailError(f"{where}: expected --robot and --task: neither it nor its dataset says them")
         meta = replace(meta, environment=task)
+        if config.mode and not meta.mode:
+            meta = replace(meta, mode=config.mode, actions="intent")
     meta = replace(meta, robot=robot or meta.robot, hand=config.hand or meta.hand)
     if meta.hand == MIXED:
         raise HandrailError(f"{where}: expected --hand: in its demonstrations several hands do the task")
@@ -122,12 +124,12 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     origin: dict[str, Any] = {"environment": "", "robot": ""}
     with suppress(HandrailError, OSError):  # it need not be here
         origin, fps = origin_of(info := read_info(root), read_episodes(root)), info.fps
-    origin["mode"] = config.mode
+    origin["mode"] = ""  # its actions are the recorded ones, unless --mode says otherwise
     return PolicyMeta(
         interface=None,
         **origin,
         fps=fps,
-        actions="intent" if config.mode else "recorded",
+        actions="recorded",
         training_seed=training.get("seed") or 0,
         dataset_draw=0,
         trained_on={},

@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
-from handrail.policies.imitation.interface.checkpoint import NAME
+from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, write_meta
 
 
 def entry(kind, *shape):
@@ -119,9 +119,15 @@ def test_a_policy_may_see_pictures_instead_of_the_environment_s_state(plain):
     assert condition.checkpoint.pictures == {"wrist": (64, 64)}
 
 
+@pytest.mark.parametrize("described", [False, True])
 @pytest.mark.parametrize(("size", "mode", "numbers"), [(33, "ee", 7), (54, "switching", 11)])
-def test_a_policy_of_lerobot_record_is_driven_with_its_mode(size, mode, numbers, plain):
-    """There robot and scene are one vector, and an action is the mode's channels."""
+def test_a_policy_of_lerobot_record_is_driven_with_its_mode(size, mode, numbers, described, plain):
+    """There robot and scene are one vector, and an action is the mode's channels.
+
+    Law: whether `lerobot-train` has trained it, or `handrail-train --actions recorded`.
+    """
+    if described:
+        write_meta(plain, PolicyMeta(None, "", "", "robot", 20, "recorded", 0, 0, {}, "act", 1))
     reads(plain, **{"observation.state": entry("STATE", size)})
     says(plain, output_features={"action": entry("ACTION", numbers)})
     with pytest.raises(HandrailError, match=f"'action': {numbers}"):
