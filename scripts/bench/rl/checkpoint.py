@@ -31,6 +31,12 @@ class Learner(SAC):
     seconds: float
     """Of training so far."""
 
+    def set_random_seed(self, seed: int | None = None) -> None:
+        """Seed everything; the goals with one beyond 2⁶⁴: evaluations and benchmarks have those below."""
+        super().set_random_seed(seed)
+        if seed is not None and self.env is not None:
+            self.env.seed(2**64 + seed)
+
     def write(self, folder: Path) -> None:
         """Write the checkpoint of a run, in place of the one before."""
         stream = io.BytesIO()

@@ -16,8 +16,11 @@ pytest.importorskip("stable_baselines3")
 pytest.importorskip("tensorboard")
 import torch
 
+from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.run import goals
 from handrail.scripts.bench.rl import train as training
 from handrail.scripts.bench.rl.checkpoint import Learner
+from handrail.scripts.bench.rl.env import EVALUATION_SEED, FINAL_SEED, evaluation_goals
 from handrail.scripts.bench.rl.train import environment, new_model, train
 
 
@@ -128,3 +131,32 @@ def test_a_run_goes_on_with_all_that_it_had(honest, tmp_path):
     assert buffer is not None
     assert (buffer.pos, buffer.full) == (39, False)  # a step is checked before its transition is kept
     assert np.all(buffer.observations[:39].any(axis=-1))
+
+
+def drawn(model):
+    """Return the places of the first goals that a training meets."""
+    model.env.reset()
+    env = model.env.envs[0].unwrapped
+    found = [env.planner.goal.position]
+    for _ in range(2):
+        env.reset()
+        found.append(env.planner.goal.position)
+    return {tuple(each) for each in found}
+
+
+@pytest.mark.parametrize("steps", [EVALUATION_SEED, FINAL_SEED])
+def test_a_resumed_run_draws_no_goal_of_an_evaluation(steps, honest, tmp_path):
+    """Law: also not where its seed and its steps add up to the evaluation's seed."""
+    model = Learner.resumed(honest, environment(honest))
+    model.num_timesteps = steps
+    shutil.copytree(honest.folder, tmp_path / "rl")
+    model.write(tmp_path / "rl")
+    again = replace(honest, output_dir=str(tmp_path / "rl"))
+    later = drawn(Learner.resumed(again, environment(again)))
+    assert later.isdisjoint(drawn(Learner.resumed(honest, environment(honest))))
+    assert later.isdisjoint(tuple(each.position) for each in evaluation_goals(5, steps))
+
+
+def test_a_run_draws_no_goal_of_the_benchmark_of_its_seed(honest):
+    benchmark = {tuple(each.position) for each in goals(BenchmarkConfig(goals=5, seed=1))}
+    assert benchmark.isdisjoint(drawn(new_model(replace(honest, seed=1))))
