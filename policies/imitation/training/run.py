@@ -84,6 +84,7 @@ class TrainingRun:
             around = make_pre_post_processors(described, str(weights), preprocessor_overrides=device)
             load_weights(policy, weights)  # LeRobot leaves out what does not fit
             check_numbers(policy, around, weights)
+            described.pretrained_path = None  # a place on this computer is no part of a policy
         optimizer, schedule = make_optimizer_and_scheduler(settings, policy)
         if isinstance(optimizer, torch.optim.Adam):
             for group in optimizer.param_groups:  # all weights in one call

@@ -13,6 +13,8 @@ from lerobot.scripts.lerobot_train import update_policy
 from training_helpers import cut, refused, tiny, weights, write_dataset
 
 from handrail.collect.config import StoredConfig
+from handrail.policies.imitation.evaluation.conditions import read_checkpoint
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import read_meta
 from handrail.policies.imitation.training import presets, run
 from handrail.policies.imitation.training.curve import read_curve
@@ -27,6 +29,8 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
     folder, config = trained
     again = cut(config, tmp_path / "cut")
     assert weights(train(again)) == weights(folder)
+    digests = [read_checkpoint(each.folder, EvaluateConfig()).digest for each in (again, config)]
+    assert digests[0] == digests[1]
     longer = train(dataclasses.replace(again, steps=8))
     assert read_meta(longer).steps == 8
 
