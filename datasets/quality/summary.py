@@ -64,7 +64,8 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
 
 
 def _summary(episode: Demonstration) -> EpisodeSummary:
-    contacts, commands = _measured(safety.contacts, episode), _commands(episode)
+    commands, began = _commands(episode), episode.meta.get("contact_onsets")  # between frames, too
+    contacts = began if isinstance(began, int) else _measured(safety.contacts, episode)
     return EpisodeSummary(
         episode=episode.number,
         task="; ".join(episode.meta["tasks"]),

@@ -55,6 +55,17 @@ def test_an_episode_of_ours(root):
     assert (second.cells()["success"], second.cells()["why not"]) == ("no", "dropped it")
 
 
+def test_contacts_that_began_between_two_frames_count(tmp_path):
+    """Law: the number that the row says is shown; a robot may run at a higher rate than the recording."""
+    features = {"safety.contacts": FEATURES["safety.contacts"]}
+    with EpisodeWriter.create(tmp_path / "set", Manifest(REPO, FPS, ROBOT, features)) as writer:
+        for row in ({"contact_onsets": 3}, {"contact_onsets": None}):
+            for touching in (0, 1, 1):
+                writer.add_frame({"safety.contacts": touching}, "lift the cup")
+            writer.save_episode(row)
+    assert [each.contacts for each in summarize(tmp_path / "set")] == [3, 1]
+
+
 def test_chattering_of_what_was_commanded(tmp_path):
     """Corrections count on joints that are owned, whatever else was asked; the gripper is no velocity."""
     asked = ("base.vx", "joint.x", "joint.elbow", "gripper")
