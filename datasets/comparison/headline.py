@@ -55,7 +55,8 @@ def _told(contrasts: Sequence[Contrast], values: Mapping[str, Value]) -> Iterato
 def cautions(comparison: Comparison) -> dict[str, bool]:
     """Return what limits the headline, and whether it does."""
     groups, differences = comparison.everything.groups, comparison.everything.differences
-    moving = [each.name for each in comparison.everything.measurements.metrics if each.is_of_motion]
+    metrics = comparison.everything.measurements.metrics
+    rough = [each.name for each in metrics if each.needs in ("position", "scale")]
     rates, fewest = {group.info.fps for group in groups}, min(len(group.episodes) for group in groups)
     outcomes = comparison.outcomes
     conditions = [*outcomes.conditions.values()] if outcomes else []
@@ -72,7 +73,7 @@ def cautions(comparison: Comparison) -> dict[str, bool]:
         _SEVERAL: any(_people(group) > 1 for group in groups)
         and any(each.interval and not each.paired for each in differences),
         _ROLLOUTS: any(len(each) > 1 for each in rollouts),
-        _RATES: len(rates) > 1 and any(e.interval for e in differences if e.measure.name in moving),
+        _RATES: len(rates) > 1 and any(e.interval for e in differences if e.measure.name in rough),
         _UNITS: any(each.incomparable for each in differences),
         _FEW: fewest < 20,
     }
@@ -87,7 +88,7 @@ _NO_POLICIES = (
     "No evaluations were given: nothing here says from which data policies learn more. Quality metrics"
     " describe data and have often misjudged that."
 )
-_RATES = "Frame rates differ: smoothness and idle time are only roughly comparable."
+_RATES = "Frame rates differ: idle time and what the operator put in are only roughly comparable."
 _UNITS = "Some metrics are not compared, because their units may differ: the report has a table of them."
 _FEW = "A group has fewer than 20 episodes: intervals of means are rough."
 _SEVERAL = "Several persons steered: their own episodes are alike, but intervals take them for independent."

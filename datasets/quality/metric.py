@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from handrail.datasets.statistics.contrast import Measure
 
-Needs = Literal["", "motion", "position", "action", "controller", "scale"]
+Needs = Literal["", "motion", "jerk", "position", "action", "controller", "scale"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class Metric(Measure):
     @property
     def is_of_motion(self) -> bool:
         """Whether it measures what moves; of several hands, that is each of them."""
-        return self.needs in ("motion", "position")
+        return self.needs in ("motion", "jerk", "position")
 
     def of_hand(self, hand: str) -> "Metric":
         """Return the metric of one hand alone of several."""

@@ -27,7 +27,7 @@ def sparc(episode: Demonstration, scale: Scale) -> float:
     return _known(metrics.sparc(episode.speed, episode.fps))
 
 
-@metric("", "higher", "motion", "smoothness (LDLJ)")
+@metric("", "higher", "jerk", "smoothness (LDLJ)")
 def ldlj(episode: Demonstration, scale: Scale) -> float:
     """Log dimensionless jerk of the speed: minimum jerk −5.3 (short ones up to −4.9); sensitive to noise."""
     return _known(metrics.ldlj(episode.speed, episode.fps))

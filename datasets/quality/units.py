@@ -27,8 +27,9 @@ _OTHER_MODES = "the modes differ, so the controllers and their soft limits may"
 def why_not(needs: Needs, one: EpisodeSet, other: EpisodeSet) -> str:
     """Return why a metric's values of two groups cannot be compared; "" if they can.
 
-    `needs` is what its unit hangs on: nothing; what moves; the unit of that as well; what the action
-    commands; whose soft limits were given up (the groups must have been read); or everything on one scale.
+    `needs` is what its unit hangs on: nothing; what moves; of a jerk the frame rate as well; the unit of what
+    moves; what the action commands; whose soft limits were given up (the groups must have been read); or
+    everything on one scale.
     """
     if needs == "controller":
         return "" if one.modes == other.modes else _OTHER_MODES
@@ -39,8 +40,10 @@ def why_not(needs: Needs, one: EpisodeSet, other: EpisodeSet) -> str:
             return _on_one_scale(one, other)
         if needs == "action":
             return _numbers("action", one, other) or _followed(one, other)
+        if needs == "jerk" and one.first.fps != other.first.fps:
+            return "the frame rates differ, and jerk grows with them"
         tools = one.first.motion_is_tool and other.first.motion_is_tool
-        if tools and (needs == "motion" or _by_handrail(one.first, other.first)):
+        if tools and (needs != "position" or _by_handrail(one.first, other.first)):
             return ""  # the same thing moves; a measure without a unit needs no more
         return _numbers("state", one, other)
     except DoesNotApply as error:

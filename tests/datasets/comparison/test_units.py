@@ -72,7 +72,7 @@ KNOWN = {
 }
 
 
-@pytest.mark.parametrize("needs", ["motion", "position", "action", "scale"])
+@pytest.mark.parametrize("needs", ["motion", "jerk", "position", "action", "scale"])
 @pytest.mark.parametrize(("one", "other", "reason"), UNKNOWN.values(), ids=UNKNOWN)
 def test_columns_not_known_to_be_the_same_are_not_compared(one, other, reason, needs):
     found = apart(needs, one, other)
@@ -82,7 +82,7 @@ def test_columns_not_known_to_be_the_same_are_not_compared(one, other, reason, n
     assert apart("", one, other) == ""
 
 
-@pytest.mark.parametrize("needs", ["motion", "position", "action", "scale"])
+@pytest.mark.parametrize("needs", ["motion", "jerk", "position", "action", "scale"])
 @pytest.mark.parametrize(("one", "other"), KNOWN.values(), ids=KNOWN)
 def test_columns_known_to_be_the_same_are_compared(one, other, needs):
     assert apart(needs, one, other) == ""
@@ -98,6 +98,14 @@ def test_smoothness_needs_no_unit_where_both_are_a_tool_s():
         for root, names in (("a", tool), ("b", (*tool, "q")))
     ]
     assert apart("position", *ours) == ""
+
+
+def test_jerk_is_not_compared_between_frame_rates():
+    """Law: of the same motions it grows with the rate; the spectrum up to 10 Hz does not."""
+    tool, found = ("tool.x", "tool.y", "tool.z"), {each.name: each for each in METRICS}
+    pair = group(OURS, names=tool, fps=60), group(replace(OURS, root=Path("other")), names=tool, fps=20)
+    assert apart(found["ldlj"].needs, *pair) == "the frame rates differ, and jerk grows with them"
+    assert apart(found["sparc"].needs, *pair) == ""
 
 
 def test_commands_that_the_state_does_not_measure_alike():
