@@ -43,9 +43,14 @@ def point_entries(names: Sequence[str], hand: str = "") -> list[int]:
 
 
 def position_entries(names: Sequence[str], hand: str = "") -> list[int]:
-    """Return the entries that are joint positions (`elbow.pos`), the gripper's included; of a hand's arm."""
-    own = _prefixes(hand)
-    return [i for i, name in enumerate(names) if name.endswith(".pos") and name.lower().startswith(own)]
+    """Return the entries that are joint positions (`elbow.pos`), the gripper's included; of a hand's arm.
+
+    `goal.x.pos` and `tool.qw.pos`, as LeRobot has them from our robot, are none where there are others.
+    """
+    own, hands = _prefixes(hand), ("", hand, *hand_names(names))
+    found = [i for i, name in enumerate(names) if name.endswith(".pos") and name.lower().startswith(own)]
+    before = {i: names[i].lower().removesuffix(".pos").rpartition(".")[0] for i in found}
+    return [i for i in found if before[i] in hands] or found
 
 
 def gripper_entries(names: Sequence[str], hand: str = "") -> list[int]:

@@ -12,7 +12,13 @@ from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.scale import Scale
 from handrail.datasets.quality.worst import ranking_metric
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.reading.naming import gripper_entries, hand_names, point_entries, quantity
+from handrail.datasets.reading.naming import (
+    gripper_entries,
+    hand_names,
+    point_entries,
+    position_entries,
+    quantity,
+)
 from handrail.datasets.reading.reader import DatasetInfo
 
 AXES, OF_MOTION = "xyz", [metric for metric in METRICS if metric.is_of_motion]
@@ -63,6 +69,25 @@ def test_hands_are_told_apart_by_names(names, hands, tools, grippers):
     assert hand_names(names) == hands
     assert point_entries(names) == tools
     assert gripper_entries(names) == grippers
+
+
+@pytest.mark.parametrize("hands", [("",), ("left.", "right.")])
+def test_scene_and_tool_are_no_configuration(hands):
+    """Law: it is the same of what `lerobot-record` and what `handrail-record` made with our robot."""
+    around = [f"{hand}{part}" for hand in hands for part in ("gripper.opening", "tool.x", "tool.qw")]
+    around += ["goal.x", "obstacle_0.radius"]
+    moving = ["theta.pos", "left_elbow.pos", "theta.vel", "left_elbow.vel"]
+    for names in ((*moving, *around), (*moving, *(f"{name}.pos" for name in around))):
+        assert position_entries(names) == [0, 1]
+        assert position_entries(names, "left") == [1]
+
+
+def test_positions_of_other_robots_are_their_configuration():
+    """Also where the names of hands end in a dot, or all names have one."""
+    own = ("pan.pos", "left.elbow.pos", "left.gripper.pos", "right.gripper.pos", "goal.x.pos")
+    assert position_entries(own) == [0, 1, 2, 3]
+    assert position_entries(own, "left") == [1, 2]
+    assert position_entries(("main.elbow.pos", "main.elbow.vel")) == [0]
 
 
 def test_a_hand_is_measured_as_if_it_were_the_only_one():
