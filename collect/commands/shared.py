@@ -75,7 +75,7 @@ class Shards:
     def going_on(self) -> RecordConfig:
         """Return the settings that go on with the shards that are there, which must be of this recording."""
         if (staging := Layout(self.root).staging).exists():  # a recording that still runs
-            FolderLock(staging).release()
+            FolderLock(staging, existing=True).release()
         with explained(f"cannot go on with dataset {str(self.root)!r}"):
             settle(self.root)  # a merge that was cut short
         for name, now in self._settings.items():

@@ -109,8 +109,9 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
                 )
             yield [EditSource.open(root, verify) for root in roots]
             return
-        own = EditSource.open(target)
-        with FolderLock(own.layout.staging):
+        EditSource.open(target)
+        with FolderLock(Layout(target).staging, existing=True):
+            own = EditSource.open(target)  # again: another edit may have been faster
             tidy_locked(own.layout, own.manifest, Checksums(target, anew=verify))
             check_none_set_aside(own.layout)
             yield [own if root == target else EditSource.open(root, verify) for root in roots]

@@ -66,7 +66,7 @@ def read_info(root: str | Path) -> DatasetInfo:
     where = str(layout.root)
     advice = f"handrail-edit repair {shlex.quote(where)}"
     if not layout.root.is_dir():
-        repair = f", or {advice}" if beside(layout.root, "old").is_dir() else ""
+        repair = f", or {advice}" if beside(layout.root, "replaced").is_dir() else ""
         raise HandrailError(f"dataset {where!r}: expected a folder, found none; check the path{repair}")
     if not layout.info.is_file() and not layout.manifest.is_file():
         raise HandrailError(f"{where!r} is not a LeRobot dataset (no meta/info.json); check the path")

@@ -74,9 +74,10 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
     layout = Layout(followed(root))
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
         settle(layout.root)
-        manifest = read_manifest(layout)
+        read_manifest(layout)
         check_folders(layout)
-        with FolderLock(layout.staging):
+        with FolderLock(layout.staging, existing=True):
+            manifest = read_manifest(layout)  # again: an edit may have been faster
             finish_clearing(layout)
             found = survey(layout, manifest, Checksums(layout.root, anew=True))
             done = _clear(found)

@@ -17,10 +17,10 @@ from handrail.datasets.format.layout import FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import ColumnTypes, Totals
 from handrail.datasets.recording.file_group import write_file_groups
-from handrail.datasets.recording.folder import clear_staging, foreign_files, next_damaged
+from handrail.datasets.recording.folder import clear_staging, foreign_files, is_dataset, next_damaged
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, sync, write_whole
-from handrail.datasets.storage.lock import FolderLock
+from handrail.datasets.storage.lock import FolderLock, HeldError
 
 
 def write_anew(
@@ -86,6 +86,8 @@ def drafted(root: Path, replacing: bool = False) -> Iterator[Layout]:
     """
     draft = Layout(_draft(root))
     with FolderLock(draft.staging) as lock:
+        if (old := beside(root, "replaced")).exists():
+            raise HeldError(f"{str(old)!r} is still there: another edit is at work, or could not remove it")
         try:
             for path in set(draft.root.iterdir()) - {draft.staging}:  # of a writing that was cut short
                 remove(path)
@@ -93,7 +95,7 @@ def drafted(root: Path, replacing: bool = False) -> Iterator[Layout]:
             clear_staging(draft)
             publish_folder(draft.root, root, replacing)
         except BaseException:
-            if root.exists() or not replacing:  # else it has no name, and `settle` goes on
+            if is_dataset(Layout(root)) or not replacing:  # else it has no name, and `settle` goes on
                 remove(draft.root)
             raise
         lock.moved(Layout(root).staging)
@@ -114,16 +116,18 @@ def settle(root: Path) -> bool:
         HeldError: It is not cut short: another process is writing.
         OSError: Something cannot be renamed or removed.
     """
-    old, draft = beside(root, "old"), Layout(_draft(root))  # as `publish_folder` calls them
-    finished, drafted = old.exists(), draft.root.exists()
-    if finished or drafted:
-        with FolderLock(draft.staging) as lock:
-            if finished and not root.exists():
-                os.replace(draft.root if drafted else old, root)
-                lock.moved(Layout(root).staging)
-                sync(root.parent)
+    old, draft, dataset = beside(root, "replaced"), Layout(_draft(root)), Layout(root)
+    if not (old.exists() or draft.root.exists()):  # as `publish_folder` calls them
+        return False
+    with FolderLock(draft.staging) as lock:
+        finished = old.exists()
+        if not is_dataset(dataset) and is_dataset(Layout(old)):  # cut short between its two names
+            os.replace(draft.root if is_dataset(draft) else old, root)
+            lock.moved(dataset.staging)
+            sync(root.parent)
+        if is_dataset(dataset):
             remove(old)
-            remove(draft.root)
+        remove(draft.root)
     return finished
 
 

@@ -101,7 +101,8 @@ class EpisodeWriter:
             settle(layout.root)
             check_target(layout, overwrite)
             lock = on_error.enter_context(FolderLock(layout.staging))
-            check_target(layout, overwrite)  # again: another recorder may have been faster
+            settle(layout.root)  # again: an edit may have begun, and would have no dataset between its names
+            check_target(layout, overwrite)  # and another recorder may have been faster
             clear_dataset(layout)
             write_whole(layout.manifest, manifest.to_bytes(), layout.staging)
             write_whole(layout.info, info_bytes(manifest, Totals()), layout.staging)
@@ -122,11 +123,12 @@ class EpisodeWriter:
         words = f"--resume: cannot add to dataset {str(layout.root)!r}"
         with explained(words), contextlib.ExitStack() as on_error:
             settle(layout.root)
-            existing = read_manifest(layout)
+            read_manifest(layout)
             manifest.check()
-            manifest.check_fits(existing, words)
             check_folders(layout)
-            lock = on_error.enter_context(FolderLock(layout.staging))
+            lock = on_error.enter_context(FolderLock(layout.staging, existing=True))
+            existing = read_manifest(layout)  # again: an edit may have been faster
+            manifest.check_fits(existing, words)
             report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
             types = read_column_types(row_files(layout)[-1]) if totals.episodes else None
             on_error.pop_all()

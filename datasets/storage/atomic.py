@@ -106,7 +106,7 @@ def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
     """
     for path in (draft, *draft.rglob("*")):
         sync(path)
-    old = beside(final, "old")
+    old = beside(final, "replaced")
     if replacing:
         remove(old)
         if final.exists():

@@ -10,6 +10,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.storage.atomic import make_folder
 
 LOCK_NAME = "lock"
+_TRIES = 1000  # to take it while others give it back
 
 
 class HeldError(HandrailError):
@@ -19,13 +20,14 @@ class HeldError(HandrailError):
 class FolderLock:
     """The right to change one folder, held from construction to `release`."""
 
-    def __init__(self, staging: Path, thing: str = "", holder: str = "recorder"):
+    def __init__(self, staging: Path, thing: str = "", holder: str = "recorder", existing: bool = False):
         """Take the lock.
 
         Args:
             staging: The folder of the lock's file; created if missing.
             thing: The locked thing, in words and with its name; empty for the dataset that the folder is in.
             holder: The program that may hold it, in words.
+            existing: Whether the folder of `staging` must be there; if not, a writing anew is renaming it.
 
         Raises:
             HeldError: Another process, or another writer in this one, holds it.
@@ -33,7 +35,7 @@ class FolderLock:
         """
         self._path = staging / LOCK_NAME
         self._thing, self._holder = thing or f"dataset {str(staging.parent)!r}", holder
-        self._file: BinaryIO | None = self._acquire()
+        self._file: BinaryIO | None = self._acquire(existing)
 
     def release(self) -> None:
         """Give the lock back and remove the staging folder if nothing else is in it; safe to call twice."""
@@ -56,21 +58,29 @@ class FolderLock:
     def __exit__(self, *_: object) -> None:
         self.release()
 
-    def _acquire(self) -> BinaryIO:
-        while True:
-            make_folder(self._path.parent)
-            file = open(self._path, "ab", opener=_opened)  # noqa: SIM115 - held for as long as the lock is
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
+    def _acquire(self, existing: bool) -> BinaryIO:
+        folder = self._path.parent
+        held = HeldError(
+            f"{self._thing} is being written by another {self._holder}: expected to be the only one;"
+            " close the other, or choose another name"
+        )
+        for _ in range(_TRIES):
+            with contextlib.suppress(
+                FileNotFoundError, FileExistsError
+            ):  # the last holder has just removed the folder
+                folder.mkdir(exist_ok=True) if existing else make_folder(folder)
+                file = open(self._path, "ab", opener=_opened)  # noqa: SIM115 - held for as long as the lock is
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except OSError as error:
+                    file.close()
+                    raise held from error
+                if self._is_current(file):
+                    return file
                 file.close()
-                raise HeldError(
-                    f"{self._thing} is being written by another {self._holder}: expected to be the only one;"
-                    " close the other, or choose another name"
-                ) from error
-            if self._is_current(file):
-                return file
-            file.close()
+        if not existing or folder.parent.is_dir():
+            make_folder(folder)  # says why there is none
+        raise held
 
     def _is_current(self, file: BinaryIO) -> bool:
         """Return whether the locked file is still the one with the lock's name (its owner removes it)."""

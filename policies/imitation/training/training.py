@@ -124,7 +124,7 @@ def _begin(config: TrainConfig) -> Path | None:
 
 
 def _is_checkpoint(path: Path) -> bool:
-    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdecimal()
+    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".replaced").isdecimal()
 
 
 def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float]) -> PolicyMeta:

@@ -122,7 +122,7 @@ class Work:
 
     def progress(self) -> int:
         """Return how far it is: quick, and whatever runs."""
-        return any(self._hidden(kind).exists() for kind in ("partial", "old"))
+        return any(self._hidden(kind).exists() for kind in ("partial", "replaced"))
 
     @property
     def steps(self) -> int:
@@ -131,8 +131,9 @@ class Work:
 
     def saved(self) -> Saved:
         """Return what is saved now; raises if a saved piece cannot be read."""
-        between = not self.place.exists() and self._hidden("old").exists()  # the next command finishes it
-        return self._read(self._hidden("old") if between else self.place)
+        replaced = self._hidden("replaced")
+        between = not self.place.exists() and replaced.exists()  # the next command finishes it
+        return self._read(replaced if between else self.place)
 
     def lost(self, before: Saved, now: Saved) -> list[str]:
         """Return what was saved and is not any more, and what is not as it would be undisturbed."""

@@ -209,7 +209,7 @@ def test_an_edit_that_was_cut_short_is_finished_and_not_done_twice(tmp_path):
     """Killed between two renames, the same line again would delete another episode."""
     root = copied(tmp_path / "set", record_episodes)
     edit(f"delete --episodes 0 --output {tmp_path / '.set.partial'}", root)
-    root.rename(tmp_path / ".set.old")
+    root.rename(tmp_path / ".set.replaced")
     said = edit("delete --episodes 0 --in_place", root, code=2).stderr
     assert "was cut short, and is finished now" in said
     assert [row["seed"] for row in read_episodes(root)] == [1, 2, 3]

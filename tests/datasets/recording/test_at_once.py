@@ -1,12 +1,16 @@
 """Whatever two processes do at once, an episode that one of them has saved stays."""
 
+import contextlib
 import os
+import pkgutil
 import shutil
+import threading
 from unittest import mock
 
 import pytest
 from datasets_helpers import create, fails, record, record_one, resume, tree
 
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.config import SplitConfig
 from handrail.datasets.editing.edit import edit
 from handrail.datasets.editing.merge import merge_datasets
@@ -15,6 +19,8 @@ from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording import rewrite
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.recording.rewrite import settle
+from handrail.datasets.storage import lock
+from handrail.datasets.storage.atomic import make_folder
 from handrail.datasets.storage.lock import FolderLock, HeldError
 
 
@@ -83,6 +89,21 @@ def test_a_lock_whose_folder_was_replaced_frees_nobody_elses(tmp_path):
     assert not staging.exists()
 
 
+def test_a_lock_is_taken_where_its_folder_was_removed_at_that_moment(tmp_path, monkeypatch):
+    staging, made = tmp_path / "set" / ".handrail", []
+
+    def make(folder):
+        make_folder(folder)
+        made.append(folder)
+        if len(made) == 1:
+            folder.rmdir()
+
+    monkeypatch.setattr(lock, "make_folder", make)
+    with FolderLock(staging), pytest.raises(HeldError):
+        FolderLock(staging)
+    assert len(made) == 3
+
+
 def test_a_repair_leaves_alone_what_is_just_getting_its_name(tmp_path, meanwhile):
     root = record(tmp_path / "set", 3)
     for other in (repair, settle, resume, lambda root: create(root, overwrite=True)):
@@ -128,3 +149,74 @@ def test_resume_goes_on_where_an_edit_was_cut_short(cut):
     with resume(cut) as writer:
         assert record_one(writer, cameras=False) == 3
     assert not check_report(cut)
+
+
+def resumed(root):
+    with resume(root):
+        pass
+
+
+@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize(
+    ("write", "place"),
+    [
+        (resumed, "recording.writer.check_folders"),
+        (repair, "recording.repair.check_folders"),
+        (create, "recording.writer.settle"),
+        (lambda root: merge_datasets([root.with_name("other")], root), "editing.source.settle"),
+    ],
+)
+def test_an_edit_between_its_two_names_when_another_takes_the_lock(
+    tmp_path, monkeypatch, write, place, killed
+):
+    """The other one has settled before the edit began: no dataset had the name when it took the lock."""
+    root, real, edits = record(tmp_path / "set", 5), os.replace, []
+    record(tmp_path / "other", 1)
+    begun, between, end = threading.Event(), threading.Event(), threading.Event()
+
+    def replace(source, target):
+        if str(target) == str(root) and threading.current_thread() in edits:
+            if killed:
+                raise SystemExit
+            between.set()
+            end.wait()
+        real(source, target)
+
+    def merge():
+        with contextlib.suppress(SystemExit):
+            merge_datasets([root], root)
+        between.set()
+
+    monkeypatch.setattr(os, "replace", replace)
+    was = pkgutil.resolve_name(f"handrail.datasets.{place}")
+
+    def meanwhile(*arguments):
+        answer = was(*arguments)
+        if not begun.is_set():
+            begun.set()
+            edits.append(threading.Thread(target=merge))
+            edits[0].start()
+            between.wait()
+        return answer
+
+    monkeypatch.setattr(f"handrail.datasets.{place}", meanwhile)
+    try:
+        with pytest.raises(HandrailError):
+            write(root)
+    finally:
+        end.set()
+        edits[0].join()
+    settle(root)
+    assert len(read_episodes(root)) == 5
+    assert not check_report(root)
+    assert sorted(os.listdir(tmp_path)) == ["other", "set"]
+
+
+def test_a_backup_beside_a_dataset_is_left_alone(tmp_path):
+    root = record(tmp_path / "set", 2)
+    there = tree(shutil.copytree(root, tmp_path / ".set.old"))
+    merge_datasets([root], root)
+    repair(root)
+    with resume(root):
+        pass
+    assert tree(tmp_path / ".set.old") == there
