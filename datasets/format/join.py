@@ -10,10 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import av
+import numpy as np
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.video import place_of, sought, whole_mp4
+
+_TOLERANCE = 1e-4  # LeRobot's `tolerance_s` [s]
 
 
 @dataclass(frozen=True)
@@ -89,14 +92,15 @@ class VideoJoin:
         self._pictures = self.size = 0
 
     def fits(self, stretch: Stretch) -> bool:
-        """Return whether a stretch is encoded as what is there."""
-        return self._container is None or self._like == _encoding(stretch.stream)
+        """Return whether a stretch is encoded as what is there, and is found after it."""
+        alike = self._container is None or self._like == _encoding(stretch.stream)
+        return alike and are_found(self._pictures, stretch.count, self._fps)
 
     def add(self, stretch: Stretch) -> None:
         """Append a stretch that fits."""
         if self._container is None:
             self._container = av.open(str(self.target), "w", format="mp4")
-            self._out = self._container.add_stream_from_template(stretch.stream)
+            self._out = self._container.add_stream_from_template(stretch.stream, opaque=True)
             self._like = _encoding(stretch.stream)
         base = stretch.stream.time_base
         shift = round(Fraction(self._pictures - stretch.first, self._fps) / base)
@@ -112,6 +116,19 @@ class VideoJoin:
         if self._container is not None:
             self._container.close()
         self._container = None
+
+
+def are_found(first: int, count: int, fps: int) -> bool:
+    """Return whether LeRobot finds pictures in a video by their times, which it rounds to float32.
+
+    Args:
+        first: The picture that an episode begins with.
+        count: Number of its pictures.
+        fps: Pictures a second [Hz].
+    """
+    asked = np.float32(first / fps + np.float32(np.arange(count) / fps).astype(float))
+    shown = np.float32(np.arange(first, first + count) / fps)
+    return bool((np.abs(asked - shown) < _TOLERANCE).all())
 
 
 def _encoding(stream: Any) -> tuple:

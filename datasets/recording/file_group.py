@@ -1,10 +1,12 @@
 """Writing episodes into file groups: one file of rows, one of episode rows and one video a camera for many.
 
-A group ends when it is as large as LeRobot's files (100 MB of rows, 200 MB of video), and where a video is
-encoded in another way. Nothing that is written is read or written again.
+A group ends when it is as large as LeRobot's files (100 MB of rows, 200 MB of video), where a video is
+encoded in another way, and where LeRobot would not find a picture of a long video. Nothing that is written is
+read or written again.
 """
 
 from collections.abc import Iterable
+from contextlib import closing
 from dataclasses import replace
 
 from handrail.controllers.errors import HandrailError
@@ -40,13 +42,10 @@ def write_file_groups(
         HandrailError, ValueError: One does not fit.
         OSError: The disk does not take it.
     """
-    writer = _GroupWriter(layout, manifest, types)
-    try:
+    with closing(_GroupWriter(layout, manifest, types)) as writer:
         for each in slices:
             writer.add(each)
         writer.finish()
-    finally:
-        writer.close()
     return writer.totals
 
 
@@ -65,19 +64,14 @@ class _GroupWriter:
     def add(self, piece: EpisodeSlice) -> None:
         """Append an episode."""
         stretches = {key: self._stretch(piece, key) for key in piece.videos}
-        if self._rows is None or not self._takes(self._rows, stretches):
-            self.finish()
-            rows = self._rows = self._begin(piece)
-        else:
-            rows = self._rows
+        rows = self._group(piece, stretches)
         known = {name: value for name, value in piece.columns.items() if value is not None}
         extras = fit_columns(known, self._types)
         table, tasks, stats = piece.rows(self._schema, self._manifest.fps, self.totals, self._files)
         for key, stretch in stretches.items():
             if piece.is_cut:
-                camera = self._manifest.features[key]
-                place = piece.first_picture, self._manifest.fps
-                stats[key] = decoded_stats(piece.videos[key], piece.length, camera, *place)
+                cut = piece.length, self._manifest.features[key], piece.first_picture, self._manifest.fps
+                stats[key] = decoded_stats(piece.videos[key], *cut)
             self._joins[key].add(stretch)
         rows.add(table)
         record = replace(
@@ -119,19 +113,21 @@ class _GroupWriter:
         self._files.close()
         self._videos.close()
 
-    def _begin(self, piece: EpisodeSlice) -> GrowingDataFile:
+    def _group(self, piece: EpisodeSlice, stretches: dict[str, Stretch]) -> GrowingDataFile:
+        """Return the rows of the group that an episode is added to: the open one, or a new one."""
+        rows, joins = self._rows, self._joins
+        fit = (joins[key].size < MOST_VIDEO and joins[key].fits(each) for key, each in stretches.items())
+        if rows is not None and rows.size < MOST_ROWS and all(fit):
+            return rows
+        self.finish()
         self._before, self._records = self.totals, []
         first = self._before.episodes
         data, videos = self._layout.data(first), {key: self._layout.video(key, first) for key in piece.videos}
         for path in (data, *videos.values()):
             make_folder(path.parent)
         self._joins = {key: VideoJoin(path, self._manifest.fps) for key, path in videos.items()}
-        return GrowingDataFile(data, self._schema)
-
-    def _takes(self, rows: GrowingDataFile, stretches: dict[str, Stretch]) -> bool:
-        """Return whether one more episode may be added to the group."""
-        full = rows.size >= MOST_ROWS or any(join.size >= MOST_VIDEO for join in self._joins.values())
-        return not full and all(self._joins[key].fits(stretch) for key, stretch in stretches.items())
+        self._rows = GrowingDataFile(data, self._schema)
+        return self._rows
 
     def _stretch(self, piece: EpisodeSlice, key: str) -> Stretch:
         """Return what of a camera's video is to be joined; what cannot be copied is encoded anew."""

@@ -1,6 +1,7 @@
 """What other tools do to a dataset is no damage; what repair and `--resume` do is said in one line."""
 
 import json
+import os
 import warnings
 
 from command_helpers import command, ran
@@ -14,7 +15,11 @@ from datasets_helpers import (
     resume,
 )
 
+from handrail.datasets.editing.config import TrimConfig
+from handrail.datasets.editing.edit import edit
+from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.repair import repair
 
 
@@ -50,3 +55,21 @@ def test_episodes_of_another_tool_are_not_touched(tmp_path):
     pq.write_table(pq.read_table(layout.row(1)).replace_schema_metadata(None), layout.row(2))
     for attempt in (lambda: repair(root), lambda: resume(root)):
         fails(attempt, "written by another tool", unchanged=root)
+
+
+def test_what_lerobot_encodes_by_default_is_edited_and_repaired(root):
+    """LeRobot's decoder of AV1 has another name than its encoder."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.configs import RGBEncoderConfig
+        from lerobot.datasets.dataset_tools import reencode_dataset
+
+        reencode_dataset(open_with_lerobot(root), RGBEncoderConfig())
+    edit(TrimConfig(folder=str(root), output=str(root.with_name("trimmed"))))
+    merge_datasets([root], root.with_name("packed"))
+    assert [len(read_episodes(root.with_name(name))) for name in ("trimmed", "packed")] == [4, 4]
+    os.truncate(Layout(root).data(3), 30)
+    assert repair(root, set_aside_damaged=True).episodes == 3
+    for each in (root, root.with_name("packed")):
+        found = open_with_lerobot(each)
+        check_pictures(found, range(len(found)))
