@@ -33,6 +33,7 @@ def check_target(layout: Layout, overwrite: bool) -> None:
         raise HandrailError(
             f"{str(root)!r}: expected a folder that can be written, but {str(existing)!r} cannot"
         )
+    check_folders(layout)
     paths = [path for path in root.iterdir() if path.name != STAGING] if root.is_dir() else []
     names = sorted(path.name for path in paths if not path.is_dir() or any(path.iterdir()))
     if not names:
@@ -52,7 +53,6 @@ def check_target(layout: Layout, overwrite: bool) -> None:
             f"dataset {str(root)!r} was not recorded by Handrail (no meta/handrail.json): never removed;"
             " choose another root"
         )
-    check_folders(layout)
     if foreign := foreign_files(layout):
         raise HandrailError(
             f"dataset {str(root)!r}: found files that Handrail did not write, {shortened(foreign, ', ')};"

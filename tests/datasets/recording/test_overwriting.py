@@ -162,3 +162,12 @@ def test_a_dataset_in_use_is_left_alone(recorded):
     with resume(recorded, cameras=False), pytest.raises(HandrailError, match="is being written by another"):
         drop_episodes(recorded, odd)
     assert len(read_episodes(recorded)) == 5
+
+
+def test_a_folder_with_nothing_but_a_link_for_our_files_is_no_empty_one(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("mine")
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / ".handrail").symlink_to(tmp_path / "mine")
+    fails(lambda: create(tmp_path / "set"), "found a link at .handrail")
+    assert (tmp_path / "mine" / "thesis.tex").read_text() == "mine"
