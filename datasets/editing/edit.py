@@ -11,7 +11,6 @@ from itertools import accumulate
 import numpy as np
 import pyarrow as pa
 
-from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.editing.config import (
     DeleteConfig,
@@ -110,23 +109,19 @@ def moving_stretch(episode: Demonstration, margin: float) -> tuple[int, int]:
         margin: Time to leave on both sides [s].
     """
     positions, count = episode.configuration, episode.count
-    moved = np.flatnonzero(_away(positions, positions[0]))
-    if not moved.size:
+    still = np.maximum(FLOOR, _SHARE * np.ptp(positions, axis=0))
+    moved, away = (np.flatnonzero((abs(positions - positions[end]) > still).any(axis=1)) for end in (0, -1))
+    if not moved.size or not away.size:
         return 0, count
     spare = round(margin * episode.fps)
     first = max(0, int(moved[0]) - spare)
-    last = int(np.flatnonzero(_away(positions, positions[-1]))[-1]) + 1
     done = np.flatnonzero(episode.frames.get(_SUCCESS, ()))[:1]
-    end = max(min(count, last + 1 + spare), *(int(frame) + 1 for frame in done), 0)
+    end = max(min(count, int(away[-1]) + 2 + spare), *(int(frame) + 1 for frame in done), 0)
+    if end <= first:
+        return 0, count
     pictured = any(feature.is_video for feature in episode.info.features.values())
     first -= first % GROUP if pictured else 0
     return first, end - first
-
-
-def _away(positions: FloatArray, place: FloatArray) -> BoolArray:
-    """Return at which frames anything is elsewhere, (N,)."""
-    still = np.maximum(FLOOR, _SHARE * np.ptp(positions, axis=0))
-    return (np.abs(positions - place) > still).any(axis=1)
 
 
 def _chosen(flag: str, words: Sequence[str], successes: Sequence[bool | None]) -> list[int]:

@@ -30,6 +30,11 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
     info, found = _surveyed(root, verify)
     if found is not None:
         found.require_whole()
+        if stray := [found.layout.relative(each) for each in found.unknown if each.suffix == ".parquet"]:
+            raise HandrailError(
+                f"dataset {str(info.root)!r}: LeRobot reads files of no episode, {shortened(stray, ', ')};"
+                f" handrail-edit repair {shlex.quote(str(info.root))} moves them to .damaged"
+            )
     if missing := _missing(info):
         raise HandrailError(
             f"dataset {str(info.root)!r} was copied in part: {len(missing)} files are missing"
@@ -75,11 +80,10 @@ def _surveyed(root: str | Path, verify: bool) -> tuple[DatasetInfo, Survey | Non
     info = read_info(root)
     layout = Layout(info.root)
     for folder in FOLDERS:
-        for top, _, names in os.walk(info.root / folder):
-            for path in (Path(top, name) for name in names):
-                with explained(f"dataset {str(info.root)!r}: {layout.relative(path)}"):
-                    if path.exists():  # a link to nowhere is a file that is missing
-                        regular(path)
+        for path in (Path(top, name) for top, _, names in os.walk(info.root / folder) for name in names):
+            with explained(f"dataset {str(info.root)!r}: {layout.relative(path)}"):
+                if path.exists():  # a link to nowhere is a file that is missing
+                    regular(path)
     if not info.from_handrail:
         return info, None
     try:

@@ -239,10 +239,10 @@ def _file_faults(
         return [f"{name} ({first_line(error)})"] * len(rows)
     if found == saved:
         return [""] * len(rows)
-    faults = content_faults(path, name, manifest, rows)
+    same_size = found.size == saved.size
+    decayed = same_size and name.startswith("videos/")  # one that is encoded anew has another size
+    faults = ["bits have changed"] * len(rows) if decayed else content_faults(path, name, manifest, rows)
     if not any(faults):
         return found
-    other = (
-        f"has {found.size} bytes, expected {saved.size}" if found.size != saved.size else "has other content"
-    )
+    other = "has other content" if same_size else f"has {found.size} bytes, expected {saved.size}"
     return [f"{name} {other} ({fault})" if fault else "" for fault in faults]

@@ -1,6 +1,7 @@
 """Whatever is edited, what stays is what was recorded: every column, picture and line of metadata."""
 
 import shlex
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from command_helpers import command
 from datasets_helpers import CAMERAS, TASKS, brightness, open_with_lerobot, tree
 from editing_helpers import LENGTH, MOVING, STILL, record_episodes
 
+from handrail.datasets.editing.edit import moving_stretch
 from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
@@ -235,7 +237,7 @@ def test_an_edit_in_place_removes_no_file_of_no_episode(tmp_path):
     stray = root / "data/chunk-000/mine.parquet"
     stray.write_bytes(b"mine")
     assert ".damaged" in edit("delete --episodes 0 --in_place", root, code=2).stderr
-    assert [path.read_bytes() for path in (root / ".damaged").rglob("mine.parquet")] == [b"mine"]
+    assert stray.read_bytes() == b"mine"
     assert len(read_episodes(root)) == 4
 
 
@@ -257,3 +259,14 @@ def test_episodes_dropped_behind_a_link_are_gone(tmp_path):
     assert [row["seed"] for row in read_episodes(root)] == [0, 1]
     assert drop_episodes(tmp_path / "set", lambda row: True) == 2
     assert not root.exists()
+
+
+@pytest.mark.parametrize(
+    "lasting", [{0: 10, 0.0055: 10, 0.0045: 20}, {0: 10, -0.004: 2, 0.003: 28, 0.0055: 5}]
+)
+def test_an_episode_that_hardly_moves_is_not_trimmed(lasting):
+    values = np.repeat(list(lasting), list(lasting.values()))
+    state = np.append(values, np.full(15 * (-0.004 in lasting), 0.003))[:, None]
+    info = SimpleNamespace(features={}, fps=20)
+    episode = SimpleNamespace(configuration=state, count=len(state), fps=20, frames={}, info=info)
+    assert moving_stretch(episode, 0.25) == (0, len(state))

@@ -207,3 +207,24 @@ def test_another_file_under_the_name_of_one_of_rows_is_one_line(root, of):
     with pytest.raises(HandrailError, match=r"\A[^\n]*\Z"):
         read_frames(root, 0)
     assert "episode 0: data/" in check_report(root)[0]
+
+
+def test_a_copy_of_a_data_file_which_lerobot_would_read_is_refused(root):
+    data = Layout(root).data(0)
+    shutil.copy(data, data.with_name("file-000 (1).parquet"))
+    with pytest.raises(HandrailError, match=r"file-000 \(1\).parquet; handrail-edit repair .* moves them"):
+        check_whole(root)
+    repair(root)
+    check_whole(root)
+
+
+def test_a_bit_of_a_video_that_still_decodes_is_damage(tmp_path):
+    root = record(tmp_path / "set", 4, cameras=True)
+    merge_datasets([root], root)
+    video = min(root.glob("videos/*/*/*.mp4"))
+    whole = video.read_bytes()
+    end = whole.index(b"mdat") + 4
+    place = whole.index(b"x264", end)  # a comment of the encoder
+    video.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    with pytest.raises(HandrailError, match=r"4 of 4 episodes .* has other content"):
+        check_whole(root)
