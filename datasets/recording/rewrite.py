@@ -52,9 +52,7 @@ def write_anew(
     with drafted(root, in_place) as draft:
         totals = write_file_groups(draft, manifest, slices, types)
         if not totals.episodes and damaged is None:
-            raise HandrailError(
-                f"{str(root)!r}: expected at least one episode, got none; nothing was written"
-            )
+            raise HandrailError(f"{str(root)!r}: expected at least one episode; nothing was written")
         summary = summary_files(draft, manifest, totals, encodings)
         for path, data in {draft.manifest: manifest.to_bytes(), **summary}.items():
             if data is not None:
@@ -64,11 +62,9 @@ def write_anew(
             for name in foreign_files(Layout(root)):
                 if not (root / name).is_symlink():  # it may stand for a file of the old dataset
                     _second_name(root / name, draft.root / name)
-        if damaged is not None:
-            old = Layout(root)
-            target = next_damaged(draft)
-            for path in damaged:
-                _second_name(path, target / old.relative(path))
+        quarantine = next_damaged(draft)
+        for path in damaged or ():
+            _second_name(path, quarantine / path.relative_to(root))
     return totals
 
 
@@ -126,9 +122,9 @@ def settle(root: Path) -> bool:
             lock.moved(dataset.staging)
             sync(root.parent)
         if is_dataset(dataset):
-            remove(old)
+            shutil.rmtree(old, ignore_errors=True)
         remove(draft.root)
-    return finished
+    return finished and not old.exists()
 
 
 def _copy_beside(root: Path, target: Path) -> None:

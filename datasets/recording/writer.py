@@ -192,10 +192,9 @@ class EpisodeWriter:
                     remove(path)
                 self._discard()
             self._unusable = ""
-            why = error if isinstance(error, HandrailError) else reason(error)
             raise HandrailError(
-                f"episode {number} in {str(self.root)!r} could not be saved: {why}; the {number} saved"
-                " episodes are whole"
+                f"episode {number} in {str(self.root)!r} could not be saved: {reason(error)}; the {number}"
+                " saved episodes are whole"
             ) from error
         self._types, self._totals = types, totals
         self._episode = OpenEpisode(self._layout, self._manifest)

@@ -105,7 +105,8 @@ def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
         OSError: The disk does not take it, or somebody else has made a folder of that name meanwhile.
     """
     for path in (draft, *draft.rglob("*")):
-        sync(path)
+        if not path.is_symlink():  # what is behind it is somebody else's, or nothing
+            sync(path)
     old = beside(final, "replaced")
     if replacing:
         remove(old)
@@ -113,7 +114,7 @@ def publish_folder(draft: Path, final: Path, replacing: bool = True) -> None:
             os.replace(final, old)
     os.replace(draft, final)
     sync(final.parent)
-    remove(old)
+    shutil.rmtree(old, ignore_errors=True)  # it is done; the next edit names what is left
 
 
 def move(source: Path, target: Path) -> None:

@@ -10,6 +10,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.storage.atomic import make_folder
 
 LOCK_NAME = "lock"
+_FLAGS = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK  # a named pipe would wait
 _TRIES = 1000  # to take it while others give it back
 
 
@@ -69,7 +70,7 @@ class FolderLock:
                 FileNotFoundError, FileExistsError
             ):  # the last holder has just removed the folder
                 folder.mkdir(exist_ok=True) if existing else make_folder(folder)
-                file = open(self._path, "ab", opener=_opened)  # noqa: SIM115 - held for as long as the lock is
+                file = open(os.open(self._path, _FLAGS, 0o666), "ab")  # noqa: SIM115 - open while it is held
                 try:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except OSError as error:
@@ -88,7 +89,3 @@ class FolderLock:
             return os.path.samestat(os.fstat(file.fileno()), self._path.stat())
         except FileNotFoundError:
             return False
-
-
-def _opened(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK, 0o666)  # a named pipe would wait

@@ -11,6 +11,7 @@ from filelock import FileLock
 
 from handrail.datasets.format.episode_rows import count_rows, row_files
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.storage.atomic import beside
 from handrail.scripts.bench.soak.child import Child, words_of
 from handrail.scripts.bench.soak.faults import KILLED, Fault
 from handrail.scripts.bench.soak.ray_nodes import cluster
@@ -122,7 +123,7 @@ class Work:
 
     def progress(self) -> int:
         """Return how far it is: quick, and whatever runs."""
-        return any(self._hidden(kind).exists() for kind in ("partial", "replaced"))
+        return any(beside(self.place, kind).exists() for kind in ("partial", "replaced"))
 
     @property
     def steps(self) -> int:
@@ -131,7 +132,7 @@ class Work:
 
     def saved(self) -> Saved:
         """Return what is saved now; raises if a saved piece cannot be read."""
-        replaced = self._hidden("replaced")
+        replaced = beside(self.place, "replaced")
         between = not self.place.exists() and replaced.exists()  # the next command finishes it
         return self._read(replaced if between else self.place)
 
@@ -144,9 +145,6 @@ class Work:
     def root(self) -> Path | None:
         """The dataset that a user may repair."""
         return self.place if Layout(self.place).manifest.is_file() else None
-
-    def _hidden(self, kind: str) -> Path:
-        return self.place.with_name(f".{self.place.name}.{kind}")
 
 
 class GrowingWork(Work):

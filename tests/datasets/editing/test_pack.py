@@ -1,5 +1,6 @@
 """Packed or not, in shards or not: the same rows, pictures, lines and summaries, for us and for LeRobot."""
 
+import os
 import shutil
 from itertools import pairwise
 
@@ -30,6 +31,7 @@ from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording import file_group
 from handrail.datasets.recording.repair import MOVED, repair
+from handrail.datasets.recording.rewrite import settle
 
 SUMMARIES = ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json")
 
@@ -201,3 +203,34 @@ def test_the_commands_say_what_they_wrote(whole, tmp_path):
         ((root, whole, "--output", tmp_path / "both"), "in use"),
     ):
         refused(*words, name="edit merge", told=said)
+
+
+def test_a_link_to_nowhere_beside_a_dataset_stays(tmp_path):
+    root = part(tmp_path / "set", 0, 2)
+    (root / "notes").symlink_to(tmp_path / "gone")
+    merge_datasets([root], root)
+    assert (root / "notes").readlink() == tmp_path / "gone"
+    assert not check_report(root)
+
+
+def test_a_folder_that_cannot_be_removed_fails_no_edit(tmp_path, monkeypatch):
+    root, real = part(tmp_path / "set", 0, 2), os.rmdir
+
+    def rmdir(path, **options):
+        if str(path).endswith("raw"):
+            raise PermissionError(13, "Permission denied")
+        real(path, **options)
+
+    (root / "raw").mkdir()
+    monkeypatch.setattr(os, "rmdir", rmdir)
+    merge_datasets([root], root)
+    assert (tmp_path / ".set.replaced" / "raw").is_dir()
+    assert repair(root).clean
+    with resume(root) as writer:
+        assert record_one(writer, cameras=False) == 2
+    with pytest.raises(HandrailError, match=r"\.set\.replaced' is still there"):
+        merge_datasets([root], root)
+    monkeypatch.undo()
+    assert settle(root)
+    merge_datasets([root], root)
+    assert len(read_episodes(root)) == 3
