@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 import socket
 from collections.abc import Awaitable, Callable, Hashable
 from functools import partial
@@ -18,25 +19,23 @@ _FULL = 0.1  # before another connection is taken where this process has no room
 class _Few:
     """What waits, in order of coming; the oldest of too many is cut, and whatever waits too long."""
 
-    def __init__(self, most: int, patience: float | None = None) -> None:
+    def __init__(self, most: int, patience: float = math.inf) -> None:
         self._most, self._patience = most, patience
-        self._all: dict[Hashable, tuple[Callable[[], object], asyncio.TimerHandle | None]] = {}
+        self._all: dict[Hashable, tuple[Callable[[], object], asyncio.TimerHandle]] = {}
 
     def add(self, waiting: Hashable, cut: Callable[[], object]) -> None:
-        late = self._patience and asyncio.get_running_loop().call_later(self._patience, cut)
-        self._all[waiting] = cut, late or None
+        self._all[waiting] = cut, asyncio.get_running_loop().call_later(self._patience, cut)
         if len(self._all) > self._most:
-            oldest = next(iter(self._all))
-            cut, _ = self._all[oldest]
+            oldest, (cut, _) = next(iter(self._all.items()))
             self.remove(oldest)
             cut()
 
     def remove(self, waiting: Hashable) -> bool:
         """Return whether it was there."""
-        _, late = found = self._all.pop(waiting, (None, None))
-        if late:
-            late.cancel()
-        return any(found)
+        found = self._all.pop(waiting, None)
+        if found:
+            found[1].cancel()
+        return found is not None
 
 
 class Http(H11Protocol):

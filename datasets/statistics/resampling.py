@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -109,7 +110,10 @@ def p_of_means(
         return difference_of_means(one, other, axis) / np.sqrt(np.maximum(square, NOTHING))
 
     p = permutation_p(samples, difference_of_means if paired else welch, paired, rng, tests)
-    return p if paired else float(np.fmax(p, stats.ttest_ind(*samples, equal_var=False).pvalue))
+    if paired:
+        return p
+    of_t: Any = stats.ttest_ind(*samples, equal_var=False)
+    return float(np.fmax(p, of_t.pvalue))
 
 
 @dataclass(frozen=True)
