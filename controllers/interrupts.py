@@ -36,7 +36,7 @@ class Interrupts:
         sys.unraisablehook = self._unraisable
         if self.asked and (outer := _current()):
             outer.asked = True
-        if self.asked and kind is SystemError:  # a compiled library made it of the interrupt
+        if self.asked and kind in (SystemError, TypeError):  # a compiled library made it of the interrupt
             raise KeyboardInterrupt
 
     @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from typing import Self
 
 from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.pipe import Kind
@@ -36,7 +37,7 @@ class Driving:
         self._cockpit: Cockpit | None = None
         self._recording: Recording | None = None
 
-    def __enter__(self) -> "Driving":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -94,20 +94,27 @@ def test_a_file_that_is_no_video_is_one_line(tmp_path):
         cut(tmp_path / "text.mp4", 0, 1, tmp_path / "cut.mp4")
 
 
+class CountingJoin(VideoJoin):
+    """Counts pictures without any."""
+
+    def add(self, stretch):
+        self._pictures += stretch.count
+
+
 @pytest.mark.parametrize(("count", "episodes", "groups"), [(9000, 4, [3, 1]), (300, 300, [300])])
 def test_lerobot_finds_each_picture_of_a_long_video(tmp_path, count, episodes, groups):
     """At 30 Hz, by LeRobot's arithmetic: times are rounded to float32, and may be 0.1 ms off."""
     stretch, fps, found = Stretch([], SimpleNamespace(), 0, count), 30, [0]
-    join = VideoJoin(tmp_path / "none.mp4", fps)
+    join = CountingJoin(tmp_path / "none.mp4", fps)
     for _ in range(episodes):
         if not join.fits(stretch):
             found.append(0)
-            join = VideoJoin(tmp_path / "none.mp4", fps)
+            join = CountingJoin(tmp_path / "none.mp4", fps)
         first = found[-1] * count
         stored = torch.tensor([index / fps for index in range(count)], dtype=torch.float32)
         asked = torch.tensor([first / fps + each for each in stored.tolist()])
         shown = torch.tensor([(first + index) / fps for index in range(count)])
         assert ((asked - shown).abs() < 1e-4).all()
-        join._pictures += count
+        join.add(stretch)
         found[-1] += 1
     assert found == groups

@@ -33,6 +33,14 @@ class StoppingServer:
     keep = drop = send
 
 
+class SeenDriving(Driving):
+    """Shows the person at its cockpit."""
+
+    @property
+    def person(self):
+        return self._cockpit.person
+
+
 def test_a_stop_holds_in_the_next_mode(tmp_path):
     server, folder = StoppingServer(), study_folder(tmp_path)
     with Interrupts() as interrupts, Driving(folder, "P001", server, interrupts) as driving:
@@ -54,10 +62,10 @@ def test_the_page_knows_the_robot_before_a_card_says_its_keys(tmp_path):
 @pytest.mark.parametrize("what", ["mask", "lock"])
 def test_a_mask_that_is_locked_is_changed_by_nothing(what, allow, tmp_path):
     server, folder = StoppingServer((what, [0, 1, 2])), study_folder(tmp_path, allow=allow)
-    with Interrupts() as interrupts, Driving(folder, "P001", server, interrupts) as driving:
+    with Interrupts() as interrupts, SeenDriving(folder, "P001", server, interrupts) as driving:
         briefing = driving.prepare("ee", "reach")
         driving.run(Step("practice", "ee", "reach"), 3)
-        person = driving._cockpit.person
+        person = driving.person
     mask = person.meaning.mask(person.setting)
     owned = {name for name, own in zip(person.meaning.channels.names, mask, strict=True) if own}
     assert (owned == set(briefing.channels)) == (not allow)
