@@ -1,23 +1,20 @@
-"""The interface of a task (samples an episode, names its state, judges the outcome); shared parts."""
+"""The interface of a task: it samples an episode, names its state, judges the outcome."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from handrail.collect.world.scene import FrozenArrays, Scene, SceneObject
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import unknown_name
-from handrail.controllers.robot.inverse_kinematics import hands_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _AWAY = 0.08  # [m]
 OPEN = 0.8  # share of the stroke from which a gripper is open
-_LAID_OUT = 1.49  # of the tool ahead of the base's centre at home [m]
 
 
 @dataclass(frozen=True)
@@ -181,43 +178,3 @@ class FixedTask(Task):
     def outcome(self, state: TaskState) -> Verdict:
         """Return what the judge says."""
         return self.judge(state)
-
-
-def near_home(model: RobotModel, rng: np.random.Generator) -> FloatArray:
-    """Return home with a little noise: 10 cm · scale, 0.15 rad, 0.05 rad in the arm's joints, (n,)."""
-    base, away = len(model.description.base.joints), 0.10 * model.description.world.scale
-    spread = np.concatenate([np.array([away, away, 0.15])[:base], np.full(model.size - base, 0.05)])
-    return model.description.home + rng.uniform(-spread, spread)
-
-
-def reach_share(model: RobotModel) -> float:
-    """Return how far the tool is from the base at home, as a share of 1.49 m, at most 1."""
-    home = model.description.home
-    away = model.pose(home).position[:2] - model.pose(home, "planar_base").position[:2]
-    return min(1.0, float(np.linalg.norm(away)) / _LAID_OUT)
-
-
-def side_by_side(model: RobotModel, q: FloatArray, middle: Pose, apart: float) -> tuple[FloatArray, float]:
-    """Return q with two hands beside a pose, each on the side along its y where it is, and the error left.
-
-    Args:
-        model: of the robot.
-        q: to begin with, (n,).
-        middle: half-way between the hands, turned as both.
-        apart: distance between them [m].
-    """
-    y, hands = middle.rotation[:, 1], model.description.hands
-    sides = [np.sign((model.pose(q, hand.named("tool")).position - middle.position) @ y) for hand in hands]
-    goals = [Pose(middle.position + 0.5 * apart * side * y, middle.rotation) for side in sides]
-    return hands_configuration(model, q, goals)
-
-
-def hand_rotation(x: ArrayLike, z: ArrayLike) -> FloatArray:
-    """Return the rotation of a hand that points along z and opens along x, unit vectors, (3, 3)."""
-    x, z = np.asarray(x), np.asarray(z)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-def nearest_rotation(tool: FloatArray, rotations: Iterable[FloatArray]) -> FloatArray:
-    """Return the one of some rotations that is nearest to the tool's, (3, 3)."""
-    return max(rotations, key=lambda rotation: float(np.trace(rotation.T @ tool)))

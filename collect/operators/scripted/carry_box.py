@@ -7,8 +7,8 @@ import numpy as np
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase, from_phase
 from handrail.collect.operators.scripted.pick_place import above
-from handrail.collect.world.task import hand_rotation
 from handrail.collect.world.tasks.carry_box import APART, GRASP
+from handrail.collect.world.tasks.postures import hand_rotation
 from handrail.controllers.arrays import FloatArray
 
 _AHEAD = 0.72  # hands before the base's centre while carrying [m]

@@ -7,8 +7,8 @@ import numpy as np
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import Route, ScriptPhase, from_phase, turns
 from handrail.collect.operators.scripted.pick_place import PickPlaceScript
-from handrail.collect.world.task import hand_rotation
 from handrail.collect.world.tasks.pick_place import grasp_rotation
+from handrail.collect.world.tasks.postures import hand_rotation
 from handrail.controllers.arrays import FloatArray
 
 _HANDS = 0.14  # each hand from the bar's middle while both hold it [m]

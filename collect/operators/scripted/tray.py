@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase
-from handrail.collect.world.task import reach_share
+from handrail.collect.world.tasks.postures import reach_share
 from handrail.collect.world.tasks.tray import APART, HANDLE
 from handrail.controllers.robot.model import Pose
 

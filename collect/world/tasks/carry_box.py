@@ -6,17 +6,11 @@ import numpy as np
 
 from handrail.collect.world.observation import names_of, pose_names, pose_numbers
 from handrail.collect.world.scene import Scene, Viewpoint
-from handrail.collect.world.task import Aim, Start, Task, TaskState, Verdict, hand_rotation, side_by_side
+from handrail.collect.world.task import Aim, Start, Task, TaskState, Verdict
 from handrail.collect.world.tasks.catalogue import check_robot
-from handrail.collect.world.tasks.furniture import (
-    BAR,
-    BAR_LENGTH,
-    crate,
-    obstacle_features,
-    obstacle_names,
-    sample_obstacles,
-    table,
-)
+from handrail.collect.world.tasks.furniture import BAR, BAR_LENGTH, crate, table
+from handrail.collect.world.tasks.obstacles import obstacle_features, obstacle_names, sample_obstacles
+from handrail.collect.world.tasks.postures import hand_rotation, side_by_side
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import Pose, RobotModel

@@ -8,18 +8,10 @@ import numpy as np
 
 from handrail.collect.world.observation import names_of
 from handrail.collect.world.scene import Scene, SceneObject, Slide, Viewpoint, box
-from handrail.collect.world.task import (
-    Aim,
-    Start,
-    Task,
-    TaskState,
-    Verdict,
-    hand_rotation,
-    near_home,
-    nearest_rotation,
-)
+from handrail.collect.world.task import Aim, Start, Task, TaskState, Verdict
 from handrail.collect.world.tasks.catalogue import check_robot
 from handrail.collect.world.tasks.furniture import CABINET, SIDES, STEEL, WOOD, block, standing
+from handrail.collect.world.tasks.postures import hand_rotation, near_home, nearest_rotation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 

@@ -1,4 +1,4 @@
-"""Things that tasks put into scenes: tables, an open bin, cubes, a tray, obstacles on the floor."""
+"""Things that tasks put into scenes: tables, an open bin, cubes, a tray."""
 
 from typing import Any
 
@@ -6,12 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handrail.collect.world.geometry import bounding_box
-from handrail.collect.world.observation import padded, row_names
-from handrail.collect.world.scene import Colour, Part, Scene, SceneObject, box
+from handrail.collect.world.scene import Colour, Part, SceneObject, box
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import matrix_from_rpy
-from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Shape
 
 WOOD: Colour = (0.72, 0.56, 0.40, 1.0)
@@ -20,16 +17,12 @@ STEEL: Colour = (0.45, 0.47, 0.50, 1.0)
 _RED: Colour = (0.85, 0.16, 0.14, 1.0)
 _BIN: Colour = (0.20, 0.42, 0.70, 1.0)
 _CONE: Colour = (0.90, 0.45, 0.10, 1.0)
-_CRATE: Colour = (0.55, 0.58, 0.36, 1.0)
+CRATE: Colour = (0.55, 0.58, 0.36, 1.0)
 _TRAY: Colour = (0.30, 0.55, 0.42, 1.0)
 
 BAR = 0.03  # width and height of a handle [m]
 BAR_LENGTH = 0.11  # of the handle at a side [m]
 SIDES = (-1.0, 1.0)
-CLEARANCE = 0.15  # of the robot's start and obstacles on the floor from each other, at scale 1 [m]
-_MOST_OBSTACLES = 3
-_PREFIX = "obstacle"
-_QUANTITIES = ("x", "y", "radius", "height")
 
 
 def block(size: tuple[float, float, float], at: ArrayLike, rgba: Colour | None = None) -> Part:
@@ -143,7 +136,7 @@ def crate(
         parts.append(block((length, thick, height), [0.0, side * (width - thick) / 2, 0.0]))
         parts.append(block((BAR, BAR_LENGTH, BAR), [0.0, side * (width + BAR_LENGTH) / 2, at], STEEL))
     shape = box([length, width + 2 * BAR_LENGTH, height])
-    looks = {"rgba": _CRATE, "parts": tuple(parts)}
+    looks = {"rgba": CRATE, "parts": tuple(parts)}
     return standing(name, shape, x, y, bottom, yaw, mass=mass, friction=0.8, **looks)
 
 
@@ -151,55 +144,3 @@ def can(name: str, position: FloatArray, radius: float, height: float, mass: flo
     """Return an upright can centred at a place, (3,) [m]."""
     shape = Shape("cylinder", np.array([radius, height]))
     return SceneObject(name, shape, position, rgba=_RED, mass=mass, friction=0.35)
-
-
-def obstacle_names() -> tuple[str, ...]:
-    """Return the names of what `obstacle_features` returns, (12,)."""
-    return row_names(_PREFIX, _MOST_OBSTACLES, _QUANTITIES)
-
-
-def obstacle_features(scene: Scene) -> FloatArray:
-    """Return place, radius and height of the obstacles [m], (12,); absent ones are all zero."""
-    rows = [(*item.position[:2], footprint(item), item.top) for item in floor_obstacles(scene)]
-    return padded(rows, _MOST_OBSTACLES, len(_QUANTITIES))
-
-
-def floor_obstacles(scene: Scene) -> tuple[SceneObject, ...]:
-    """Return the obstacles on the floor of a scene."""
-    return tuple(item for item in scene.objects if item.name.startswith(_PREFIX))
-
-
-def sample_obstacles(model: RobotModel, q: FloatArray, rng: np.random.Generator) -> list[SceneObject]:
-    """Draw two or three obstacles; reject those that overlap another or come close to the robot's start.
-
-    Args:
-        model: of the robot.
-        q: where it starts, (n,).
-        rng: drawn from.
-    """
-    wanted = int(rng.integers(2, _MOST_OBSTACLES + 1))
-    start, scale = model.pose(q, "planar_base").position[:2], model.description.world.scale
-    circles = [(start, float(np.hypot(*model.description.base.size) / 2))]  # the chassis, then obstacles
-    placed: list[SceneObject] = []
-    for _ in range(1000):
-        if len(placed) == wanted:
-            return placed
-        item = _sample_obstacle(f"{_PREFIX}_{len(placed)}", scale, rng)
-        at, size = item.position[:2], footprint(item)
-        if all(np.linalg.norm(at - centre) > radius + size + CLEARANCE * scale for centre, radius in circles):
-            placed.append(item)
-            circles.append((at, size))
-    raise HandrailError(
-        f"scene: no room for {wanted} obstacles around robot {model.description.name}, "
-        f"which starts at {start.round(2).tolist()}, with {CLEARANCE} m between them"
-    )
-
-
-def _sample_obstacle(name: str, scale: float, rng: np.random.Generator) -> SceneObject:
-    x, y = scale * rng.uniform([-0.4, -0.45], [0.5, 0.45])
-    height = scale * rng.uniform(0.2, 0.5)
-    if rng.random() < 0.6:
-        return pillar(name, x, y, scale * rng.uniform(0.10, 0.18), height)
-    width, depth = scale * rng.uniform(0.16, 0.26, 2)
-    yaw = rng.uniform(-np.pi / 4, np.pi / 4)
-    return standing(name, box([width, depth, height]), x, y, yaw=yaw, rgba=_CRATE)

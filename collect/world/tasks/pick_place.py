@@ -6,25 +6,10 @@ import numpy as np
 
 from handrail.collect.world.observation import names_of, pose_names, pose_numbers
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.world.task import (
-    OPEN,
-    Aim,
-    Start,
-    Task,
-    TaskState,
-    Verdict,
-    hand_rotation,
-    near_home,
-    nearest_rotation,
-)
-from handrail.collect.world.tasks.furniture import (
-    cube,
-    obstacle_features,
-    obstacle_names,
-    open_bin,
-    sample_obstacles,
-    table,
-)
+from handrail.collect.world.task import OPEN, Aim, Start, Task, TaskState, Verdict
+from handrail.collect.world.tasks.furniture import cube, open_bin, table
+from handrail.collect.world.tasks.obstacles import obstacle_features, obstacle_names, sample_obstacles
+from handrail.collect.world.tasks.postures import hand_rotation, near_home, nearest_rotation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.parts import WorldScale

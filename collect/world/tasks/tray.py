@@ -7,26 +7,11 @@ import numpy as np
 
 from handrail.collect.world.observation import names_of, pose_names, pose_numbers
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.world.task import (
-    Aim,
-    Start,
-    Task,
-    TaskState,
-    Verdict,
-    hand_rotation,
-    reach_share,
-    side_by_side,
-)
+from handrail.collect.world.task import Aim, Start, Task, TaskState, Verdict
 from handrail.collect.world.tasks.catalogue import check_robot
-from handrail.collect.world.tasks.furniture import (
-    BAR,
-    can,
-    obstacle_features,
-    obstacle_names,
-    sample_obstacles,
-    table,
-    tray,
-)
+from handrail.collect.world.tasks.furniture import BAR, can, table, tray
+from handrail.collect.world.tasks.obstacles import obstacle_features, obstacle_names, sample_obstacles
+from handrail.collect.world.tasks.postures import hand_rotation, reach_share, side_by_side
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
