@@ -5,7 +5,7 @@ import logging
 import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -13,6 +13,15 @@ from typing import Any
 from handrail.controllers.errors import HandrailError, restated, unknown_name
 
 _REFERENCE = re.compile(r"[\w.]+:[^\W\d]\w*")  # `mask:0011` is none
+
+
+@dataclass(frozen=True)
+class Buildable:
+    """An entry that is a name, how to build what it names, and a line of help."""
+
+    name: str  # as on the command line, in a mode and in the dataset
+    build: Callable[..., Any] | str  # or where that is, `module:name`
+    help: str  # one line
 
 
 def fitting[Spec: Any](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]:

@@ -40,10 +40,7 @@ def _pair_ahead(pair: FloatArray, tools: Sequence[Pose], in_tool: bool) -> tuple
     parting = 0.5 * pair[6] * way / max(float(np.linalg.norm(way)), 1e-9)
     middle, linear, angular = tools[0].position + 0.5 * way, axes @ pair[:3], axes @ pair[3:6]
     one, other = tools
-    return (
-        _moved(one, linear - parting, angular, middle),
-        _moved(other, linear + parting, angular, middle),
-    )
+    return (_moved(one, linear - parting, angular, middle), _moved(other, linear + parting, angular, middle))
 
 
 def _moved(tool: Pose, linear: FloatArray, angular: FloatArray, about: FloatArray) -> Pose:

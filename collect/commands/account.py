@@ -113,8 +113,7 @@ class RecordingLog:
         table.add_row("contacts begun", f"{contacts}, {periods} periods in contact")
         table.add_row("braked updates", str(sum(outcome.brakes for outcome in outcomes)))
         table.add_row(
-            "time a frame",
-            ", ".join(f"{part} {1e3 * time / frames:.2f} ms" for part, time in spent.items()),
+            "time a frame", ", ".join(f"{part} {1e3 * time / frames:.2f} ms" for part, time in spent.items())
         )
         return table
 

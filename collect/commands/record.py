@@ -7,13 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handrail.collect.commands.account import RecordingLog
-from handrail.collect.commands.recording import (
-    Recording,
-    come_first,
-    located,
-    open_writer,
-    session_writer,
-)
+from handrail.collect.commands.recording import Recording, come_first, located, open_writer, session_writer
 from handrail.collect.commands.shared import Shards
 from handrail.collect.config import RecordConfig
 from handrail.collect.execution.execution import Execution, WorkBar

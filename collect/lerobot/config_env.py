@@ -40,11 +40,7 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
     first_seed: int = FIRST_SEED
     """Added to LeRobot's `--seed`: by default the episodes are `handrail-evaluate`'s, none of a recording."""
     features_map: dict[str, str] = field(
-        default_factory=lambda: {
-            ACTION: ACTION,
-            "agent_pos": OBS_STATE,
-            "environment_state": OBS_ENV_STATE,
-        }
+        default_factory=lambda: {ACTION: ACTION, "agent_pos": OBS_STATE, "environment_state": OBS_ENV_STATE}
     )
 
     def __post_init__(self) -> None:

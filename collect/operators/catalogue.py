@@ -1,21 +1,17 @@
 """The operators by name; light to import."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-from handrail.controllers.registry import Registry
+from handrail.controllers.registry import Buildable, Registry
 
 
 @dataclass(frozen=True)
-class OperatorSpec:
-    """An operator: one entry makes it."""
+class OperatorSpec(Buildable):
+    """An operator: one entry makes it, by `(model, mode, task, human) -> Operator`.
 
-    name: str  # as on the command line, and what the dataset says of who steered
-    build: Callable[..., Any] | str
-    """`(model, mode, task, human) -> Operator`, or where that is, `module:name`. It gets the robot's
-    model, the `TeleopMode`, the `TaskSpec`, and the `HumanSettings` of the person."""
-    help: str  # one line
+    It gets the robot's model, the `TeleopMode`, the `TaskSpec`, and the `HumanSettings` of the person.
+    """
+
     interactive: bool = False
     """Whether it is someone now at this computer: in real time, free to change the mode."""
 

@@ -20,10 +20,7 @@ import numpy as np
 from lerobot.configs import FeatureType, PipelineFeatureType, PolicyFeature
 from lerobot.lerobot_types import RobotAction, TransitionKey
 from lerobot.processor import ProcessorStepRegistry, RobotActionProcessorStep, RobotProcessorPipeline
-from lerobot.processor.converters import (
-    robot_action_observation_to_transition,
-    transition_to_robot_action,
-)
+from lerobot.processor.converters import robot_action_observation_to_transition, transition_to_robot_action
 from msgspec import Meta
 
 from handrail.collect.processor.partial_intent import PartialIntent

@@ -30,6 +30,7 @@ from handrail.controllers.numerics.threads import single_threaded
 from handrail.datasets.recording.frames import Frame
 
 _log = logging.getLogger(__name__)
+_OBSERVED = ("state", "environment", "images", "intent", "wall_clock")  # of a frame, at its first period
 
 
 @dataclass
@@ -48,15 +49,8 @@ class Sampling:
         A frame of several periods is what was observed and asked at the first one and sent at the last one.
         """
         if first := self._open:
-            frame = replace(
-                frame,
-                state=first.state,
-                environment=first.environment,
-                images=first.images,
-                intent=first.intent,
-                wall_clock=first.wall_clock,
-                contacts=max(first.contacts, frame.contacts),
-            )
+            observed = {name: getattr(first, name) for name in _OBSERVED}
+            frame = replace(frame, **observed, contacts=max(first.contacts, frame.contacts))
         if not (frame.done or time >= (self.number + 1) * self.period - ROUNDING):
             self._open = frame
             return None

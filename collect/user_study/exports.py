@@ -11,14 +11,7 @@ from typing import Any
 
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.participant import Participant
-from handrail.collect.user_study.questionnaires import (
-    SUS,
-    TLX,
-    TLX_PAIRS,
-    sus_score,
-    tlx_raw,
-    tlx_weighted,
-)
+from handrail.collect.user_study.questionnaires import SUS, TLX, TLX_PAIRS, sus_score, tlx_raw, tlx_weighted
 from handrail.controllers.strict_toml import read_toml
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.csv_file import csv_text

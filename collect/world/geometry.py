@@ -11,13 +11,6 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.shape import Shape
 
-_TYPES = {
-    "box": mujoco.mjtGeom.mjGEOM_BOX,
-    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
-    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
-    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
-}
-
 # Who may touch whom: a pair collides when one's type meets the other's affinity; the floor's: `stage.xml`.
 SCENE_BIT, ROBOT_BIT, FLOOR_BIT = 1, 2, 4
 VISIBLE_GROUP, HIDDEN_GROUP = 1, 3
@@ -29,7 +22,7 @@ def geom_shape(shape: Shape) -> dict[str, Any]:
     size = np.zeros(3)
     size[: len(shape.size)] = shape.size
     return {
-        "type": _TYPES[shape.kind],
+        "type": getattr(mujoco.mjtGeom, f"mjGEOM_{shape.kind.upper()}"),
         "size": size / ([2.0] * 3 if shape.kind == "box" else [1.0, 2.0, 1.0]),
     }
 

@@ -67,10 +67,7 @@ class MinkController(TwistController):
         self._configuration = mink.Configuration(self._shapes)
         self._task = mink.FrameTask(model.hand.named("tool"), "site", position_cost=1.0, orientation_cost=1.0)
         arm = np.arange(model.size) >= len(model.description.base.joints)
-        self._tasks = [
-            self._task,
-            mink.DampingTask(self._shapes, np.where(arm, settings.arm, settings.base)),
-        ]
+        self._tasks = [self._task, mink.DampingTask(self._shapes, np.where(arm, settings.arm, settings.base))]
         if settings.posture:
             home = mink.PostureTask(self._shapes, settings.posture * arm)
             home.set_target(model.description.home)

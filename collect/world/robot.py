@@ -14,7 +14,7 @@ from handrail.collect.world.meshes import placed_meshes
 from handrail.collect.world.stage import new_stage
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import RobotModel, joints_of
 from handrail.controllers.robot.parts import EndEffector, PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes
 
@@ -115,29 +115,16 @@ def _add_joint(body: MjsBody, model: RobotModel, index: int) -> None:
     `_DRIVE_TIME`: MuJoCo solves contacts before it integrates the servo implicitly, and a faster loop would
     throw what the gripper holds.
     """
-    pinocchio, joint = model.pinocchio, model.pinocchio.joints[index]
-    name = pinocchio.names[index]
-    if joint.nq != 1 or joint.nv != 1:
-        raise HandrailError(
-            f"joint {name!r} of robot {model.description.name}: expected a hinge or a slide with limits, "
-            f"got {joint.shortname()}"
-        )
-    data = joint.createData()
-    joint.calc(data, np.zeros(1))
-    axis = np.asarray(data.S).reshape(6)
-    hinge = bool(np.any(axis[3:]))
+    robot, joint, name = model.pinocchio, joints_of(model)[index - 1], model.joints[index - 1]
     ends, armature = [0.0, 0.0], 0.0
     limited = name not in model.description.base.joints
     if limited:
-        ends = [
-            float(limit[joint.idx_q])
-            for limit in (pinocchio.lowerPositionLimit, pinocchio.upperPositionLimit)
-        ]
-        armature = _DRIVE_TIME * model.description.limits.servo[joint.idx_v]
+        ends = [float(end[index - 1]) for end in (robot.lowerPositionLimit, robot.upperPositionLimit)]
+        armature = _DRIVE_TIME * model.description.limits.servo[index - 1]
     body.add_joint(
         name=name,
-        type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=axis[3:] if hinge else axis[:3],
+        type=mujoco.mjtJoint.mjJNT_SLIDE if joint.prismatic else mujoco.mjtJoint.mjJNT_HINGE,
+        axis=joint.axis,
         limited=limited,
         armature=armature,
         range=ends,

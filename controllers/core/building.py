@@ -40,13 +40,8 @@ def build() -> Path:
         )
     with tempfile.TemporaryDirectory(dir=FOLDER) as folder:
         fresh = Path(folder) / built.name
-        sources = map(str, sorted(FOLDER.glob("*.c")))
-        done = subprocess.run(
-            [*compiler, *_FLAGS, *sources, "-o", str(fresh), "-lm"],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = [*compiler, *_FLAGS, *map(str, sorted(FOLDER.glob("*.c"))), "-o", str(fresh), "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             raise OSError(f"the compiled core: {compiler[0]} failed: {' '.join(done.stderr.split())[:300]}")
         os.replace(fresh, built)
@@ -60,11 +55,8 @@ def _compiler() -> list[str] | None:
     for name in ("cc", "gcc", "clang"):
         if path := shutil.which(name):
             return [path]
-    return (
-        [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
-        if importlib.util.find_spec("ziglang")
-        else None
-    )
+    zig = [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
+    return zig if importlib.util.find_spec("ziglang") else None
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
@@ -73,11 +65,6 @@ def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
 
 
 get_requires_for_build_editable = get_requires_for_build_wheel
-
-
-def get_requires_for_build_sdist(config_settings: Any = None) -> list[str]:
-    """Return what pip has to install before the sources are packed: nothing."""
-    return []
 
 
 def build_wheel(directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:

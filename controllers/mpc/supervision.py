@@ -103,11 +103,7 @@ def _grippers(loop: LoopState, intent: Intent, status: Status, hands: int) -> tu
 
 
 def _diagnostics(
-    plan: Plan | None,
-    status: Status,
-    start: float,
-    distances: FloatArray | None,
-    surroundings: Surroundings,
+    plan: Plan | None, status: Status, start: float, distances: FloatArray | None, surroundings: Surroundings
 ) -> Diagnostics:
     slack = 0.0 if plan is None else max(plan.collision_slack, plan.limit_slack)
     near = (np.inf, np.inf) if distances is None else surroundings.smallest(distances)

@@ -31,11 +31,6 @@ def leaves_freedom(channels: Channels, mask: BoolArray) -> bool:
     return bool(taken + np.count_nonzero(mask[channels.pair_slice]) < np.count_nonzero(count))
 
 
-def leaves_hand(channels: Channels, mask: BoolArray, hand: int = 0) -> bool:
-    """Whether a hand's pose is not fully commanded: not all of its twist, nor all joints."""
-    return leaves_freedom(channels, mask) and not bool(channels.twist_mask(mask, hand).all())
-
-
 def steered_joints(channels: Channels, mask: BoolArray) -> BoolArray:
     """Return which joints move a hand of which an axis is commanded, (n,)."""
     found = np.zeros(len(channels.joints), dtype=bool)

@@ -11,22 +11,16 @@ from handrail.controllers.robot.parts import Limits
 
 def velocity_regularisation(channels: Channels, weights: FloatArray) -> Objective:
     """Keep slow what nobody commands: `‖v‖²` on the joints without a command of their own, weights (n,)."""
-    return Objective(
-        name="velocity",
-        residual=lambda stage, p: stage.v,
-        reference=np.zeros(len(weights)),
-        weights=lambda mask: weights * ~commanded_joints(channels, mask),
-    )
+
+    def masked(mask: BoolArray) -> FloatArray:
+        return weights * ~commanded_joints(channels, mask)
+
+    return Objective("velocity", lambda stage, p: stage.v, np.zeros(len(weights)), masked)
 
 
 def acceleration_regularisation(weights: FloatArray) -> Objective:
     """Keep the motion smooth: `‖u‖²` on every joint, weights (n,)."""
-    return Objective(
-        name="acceleration",
-        residual=lambda stage, p: stage.u,
-        reference=np.zeros(len(weights)),
-        weights=lambda mask: weights,
-    )
+    return Objective("acceleration", lambda stage, p: stage.u, np.zeros(len(weights)), lambda mask: weights)
 
 
 def posture(channels: Channels, reference: FloatArray, weights: FloatArray) -> Objective:

@@ -6,7 +6,7 @@ import numpy as np
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.objectives.objective import Objective, Stage
-from handrail.controllers.objectives.ownership import leaves_freedom, leaves_hand
+from handrail.controllers.objectives.ownership import leaves_freedom
 
 GRAVITY = 9.81  # [m/s²]
 _WIDTH = 0.05  # of the smooth length [m/s²]
@@ -49,10 +49,8 @@ def tray_levelling(
         return ca.vertcat(normal - ca.DM([0.0, 0.0, 1.0]), (_INSIDE + beyond) * sliding)
 
     def weights(mask: BoolArray) -> FloatArray:
-        tool = channels.twist_mask(mask, hands[0])
-        free = leaves_hand(channels, mask, hands[0])
-        tilts = free and not tool[3:5].any()
-        slips = leaves_freedom(channels, mask) and not tool[:3].all()
+        tool, free = channels.twist_mask(mask, hands[0]), leaves_freedom(channels, mask)
+        tilts, slips = free and not tool[3:5].any(), free and not tool[:3].all()
         return np.repeat([level * tilts, slip * slips], 3)
 
     return Objective("tray", residual, np.zeros(6), weights)

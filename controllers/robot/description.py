@@ -13,23 +13,8 @@ from msgspec import Meta, Struct
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, check_known, restated
 from handrail.controllers.numerics.rotation import matrix_to_axis
+from handrail.controllers.robot import parts
 from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.controllers.robot.parts import (
-    ZERO,
-    Arm,
-    AtLeastZero,
-    Base,
-    Camera,
-    EndEffector,
-    Gripper,
-    Lengths,
-    Limits,
-    Numbers,
-    PlacedShape,
-    Placement,
-    Vector,
-    WorldScale,
-)
 from handrail.controllers.robot.shape import Shape, ShapeKind
 from handrail.controllers.robot.urdf import chain, find_urdf
 from handrail.controllers.strict_toml import read_toml
@@ -46,17 +31,17 @@ class RobotDescription:
     """Everything that Handrail knows of a robot; see `robots/ridgeback_ur10.toml` for the format."""
 
     name: str
-    base: Base
-    arms: tuple[Arm, ...]
-    hands: tuple[EndEffector, ...]
+    base: parts.Base
+    arms: tuple[parts.Arm, ...]
+    hands: tuple[parts.EndEffector, ...]
     home: FloatArray
-    limits: Limits
-    collision: tuple[PlacedShape, ...]
+    limits: parts.Limits
+    collision: tuple[parts.PlacedShape, ...]
     self_pairs: tuple[tuple[str, str], ...]
     self_margins: FloatArray  # largest margin that each self pair can keep [m]
-    visual: tuple[PlacedShape, ...]
-    cameras: tuple[Camera, ...]
-    world: WorldScale
+    visual: tuple[parts.PlacedShape, ...]
+    cameras: tuple[parts.Camera, ...]
+    world: parts.WorldScale
 
     def __post_init__(self) -> None:
         """Check that its parts fit together."""
@@ -123,22 +108,22 @@ class _Arm:
     joints: Annotated[tuple[Text, ...], Meta(min_length=1)]
     prefix: str = ""
     on: Text = "planar_base"
-    translation: Vector = ZERO
-    rpy: Vector = ZERO
+    translation: parts.Vector = parts.ZERO
+    rpy: parts.Vector = parts.ZERO
 
 
 @dataclass(frozen=True)
 class _Hand:
     frame: Text
     name: str = ""
-    translation: Vector = ZERO
-    rpy: Vector = ZERO
-    gripper: Gripper | None = None
+    translation: parts.Vector = parts.ZERO
+    rpy: parts.Vector = parts.ZERO
+    gripper: parts.Gripper | None = None
 
 
 @dataclass(frozen=True)
 class _Home:
-    q: Numbers
+    q: parts.Numbers
 
 
 @dataclass(frozen=True)
@@ -147,14 +132,14 @@ class _Shape:
 
     frame: Text
     name: Text = ""
-    box: Lengths | None = None
+    box: parts.Lengths | None = None
     capsule: Positive | None = None
     cylinder: tuple[Positive, Positive] | None = None
     sphere: Positive | None = None
-    at: Vector | None = None
-    rpy: Vector | None = None
-    a: Vector | None = None
-    b: Vector | None = None
+    at: parts.Vector | None = None
+    rpy: parts.Vector | None = None
+    a: parts.Vector | None = None
+    b: parts.Vector | None = None
     tool: bool = False
     rgba: Annotated[tuple[Fraction, ...], Meta(min_length=3, max_length=4)] = (0.5, 0.5, 0.5, 1.0)
 
@@ -173,18 +158,18 @@ class _Shape:
                 f"got {self.a} and {self.b}; a sphere has no length"
             )
 
-    def placed(self) -> PlacedShape:
+    def placed(self) -> parts.PlacedShape:
         """Return the shape on its frame."""
         if self.capsule is not None:
             a, b = np.array(self.a), np.array(self.b)
             length = float(np.linalg.norm(b - a))
-            placement = Placement(frozen((a + b) / 2), frozen(matrix_to_axis((b - a) / length)))
+            placement = parts.Placement(frozen((a + b) / 2), frozen(matrix_to_axis((b - a) / length)))
             shape = Shape("capsule", np.array([self.capsule, length]))
         else:
             kind: ShapeKind = next(kind for kind in _KINDS if getattr(self, kind) is not None)
             shape = Shape(kind, np.atleast_1d(getattr(self, kind)))
-            placement = Placement.of(self.at or ZERO, self.rpy or ZERO)
-        return PlacedShape(self.name, self.frame, shape, placement, self.tool, (*self.rgba, 1.0)[:4])
+            placement = parts.Placement.of(self.at or parts.ZERO, self.rpy or parts.ZERO)
+        return parts.PlacedShape(self.name, self.frame, shape, placement, self.tool, (*self.rgba, 1.0)[:4])
 
 
 class _Pair(Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
@@ -192,7 +177,7 @@ class _Pair(Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
 
     first: Text
     second: Text
-    margin: AtLeastZero = np.inf
+    margin: parts.AtLeastZero = np.inf
 
 
 @dataclass(frozen=True)
@@ -208,16 +193,16 @@ class _File:
     """The tables of a description file."""
 
     name: Text
-    base: Base
+    base: parts.Base
     arm: Annotated[tuple[_Arm, ...], Meta(min_length=1)]
     hand: Annotated[tuple[_Hand, ...], Meta(min_length=1)]
     home: _Home
-    limits: Limits
+    limits: parts.Limits
     self_collision: _SelfCollision
     collision: _Shapes
     visual: _Shapes = ()
-    camera: tuple[Camera, ...] = ()
-    world: WorldScale = field(default_factory=WorldScale)
+    camera: tuple[parts.Camera, ...] = ()
+    world: parts.WorldScale = field(default_factory=parts.WorldScale)
 
 
 def _described(file: _File, folder: Path) -> RobotDescription:
@@ -227,7 +212,9 @@ def _described(file: _File, folder: Path) -> RobotDescription:
         base=file.base,
         arms=tuple(_arm(arm, folder) for arm in file.arm),
         hands=tuple(
-            EndEffector(hand.name, hand.frame, Placement.of(hand.translation, hand.rpy), hand.gripper)
+            parts.EndEffector(
+                hand.name, hand.frame, parts.Placement.of(hand.translation, hand.rpy), hand.gripper
+            )
             for hand in file.hand
         ),
         home=file.home.q,
@@ -241,10 +228,10 @@ def _described(file: _File, folder: Path) -> RobotDescription:
     )
 
 
-def _arm(arm: _Arm, folder: Path) -> Arm:
+def _arm(arm: _Arm, folder: Path) -> parts.Arm:
     joints = tuple(arm.prefix + name for name in arm.joints)
-    place = Placement.of(arm.translation, arm.rpy)
-    return Arm(*find_urdf(arm.urdf, folder), arm.prefix, joints, arm.on, place)
+    place = parts.Placement.of(arm.translation, arm.rpy)
+    return parts.Arm(*find_urdf(arm.urdf, folder), arm.prefix, joints, arm.on, place)
 
 
 def _check_joints(robot: RobotDescription) -> None:

@@ -88,12 +88,8 @@ class Comparison:
     def values(self) -> list[Value]:
         """All measures of all conditions."""
         policies = self.outcomes.values if self.outcomes else ()
-        metrics = [
-            value
-            for view in self.views
-            for each in view.measurements.values.values()
-            for value in each.values()
-        ]
+        groups = [each for view in self.views for each in view.measurements.values.values()]
+        metrics = [value for each in groups for value in each.values()]
         return [*policies, *(each for view in self.views for each in view.collecting), *metrics]
 
 

@@ -11,18 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from handrail.datasets.comparison import user_study
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.groups import baseline_of
 from handrail.datasets.comparison.report import Report, contrast_table, values_table
 from handrail.datasets.comparison.scores import SCORES
-from handrail.datasets.comparison.user_study import (
-    MEASURES,
-    StudyData,
-    Trial,
-    form_trials,
-    read_study,
-    read_trials,
-)
 from handrail.datasets.presentation.markup import paragraph
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.reading.check import check_whole
@@ -63,10 +56,10 @@ OfPeople = Mapping[str, Scenes]  # by participant
 class PeopleComparison:
     """The result of a comparison of people; the scope of a value or a contrast is a task, or the forms."""
 
-    study: StudyData
+    study: user_study.StudyData
     baseline: str  # condition that the others are compared with
     participants: Sequence[str]  # everyone who has an episode
-    trials: Sequence[Trial]
+    trials: Sequence[user_study.Trial]
     values: Sequence[Value]  # of people's conditions, then of scripted operators'
     contrasts: Sequence[Contrast]  # of every measure, each condition against the baseline; people only
     limits: Mapping[str, object]
@@ -90,11 +83,11 @@ def _count(value: Value) -> str:
 def compare_people(config: CompareConfig) -> PeopleComparison:
     """Compare the conditions of a study as configured."""
     config.check()
-    study = read_study(Path(config.study).expanduser())
+    study = user_study.read_study(Path(config.study).expanduser())
     scripted = [Path(root).expanduser() for root in config.datasets]
     for root in (*study.datasets.values(), *scripted):
         check_whole(root, config.verify)
-    trials, left_out = read_trials(study, scripted, config.columns)
+    trials, left_out = user_study.read_trials(study, scripted, config.columns)
     baseline, rng = baseline_of(study.conditions, config.baseline), np.random.default_rng(config.seed)
     participants = tuple(sorted({trial.participant for trial in trials if trial.participant}))
     values: list[Value] = []
@@ -103,9 +96,9 @@ def compare_people(config: CompareConfig) -> PeopleComparison:
         chosen = [trial for trial in trials if trial.task == task]
         driven = list(dict.fromkeys(trial.condition for trial in chosen if trial.participant))
         people = dict.fromkeys(trial.participant for trial in chosen if trial.participant)
-        found = compared(task, MEASURES, chosen, driven, baseline, list(people), rng)
+        found = compared(task, user_study.MEASURES, chosen, driven, baseline, list(people), rng)
         values, contrasts = values + found[0], contrasts + found[1]
-    forms = form_trials(study, FORMS)
+    forms = user_study.form_trials(study, FORMS)
     found = compared(FORMS, SCORES, forms, study.conditions, baseline, participants, rng)
     values, contrasts = values + found[0], contrasts + found[1]
     limits = _limits(study, participants, trials, contrasts, left_out)
@@ -115,7 +108,7 @@ def compare_people(config: CompareConfig) -> PeopleComparison:
 def compared(
     scope: str,
     measures: Sequence[Measure],
-    trials: Sequence[Trial],
+    trials: Sequence[user_study.Trial],
     labels: Sequence[str],
     baseline: str,
     participants: Sequence[str],
@@ -154,7 +147,7 @@ def compared(
     return values, adjusted(replace(each, family=scope) for each in contrasts)
 
 
-def _of_people(trials: Sequence[Trial], label: str, measure: str) -> OfPeople:
+def _of_people(trials: Sequence[user_study.Trial], label: str, measure: str) -> OfPeople:
     """Return a measure's values under a condition by participant and scene, also for those with none."""
     found: dict[str, dict[int | None, list[float]]] = {}
     for trial in trials:
@@ -199,9 +192,9 @@ def _within_reach(contrasts: Sequence[Contrast]) -> bool:
 
 
 def _limits(
-    study: StudyData,
+    study: user_study.StudyData,
     participants: Sequence[str],
-    trials: Sequence[Trial],
+    trials: Sequence[user_study.Trial],
     contrasts: Sequence[Contrast],
     left_out: int,
 ) -> dict[str, object]:
@@ -226,18 +219,13 @@ def _limits(
 
 def people_report(comparison: PeopleComparison) -> Report:
     """Return the report of a comparison of people."""
-    study, baseline = comparison.study, comparison.baseline
+    study, baseline, people = comparison.study, comparison.baseline, comparison.participants
     scopes = dict.fromkeys(each.scope for each in comparison.values)
     tables = [table for scope in scopes for table in comparison.tables(scope)]
-    content = {
-        "format": FORMAT,
-        "demo": study.demo,
-        "baseline": baseline,
-        "participants": comparison.participants,
-    }
+    content = {"format": FORMAT, "demo": study.demo, "baseline": baseline, "participants": people}
     return Report(
         title=f"{study.root.absolute().name}: people, compared",
-        what=f"{len(comparison.participants)} participants; baseline {baseline}",
+        what=f"{len(people)} participants; baseline {baseline}",
         first=[paragraph(study.source, "headline")] if study.demo else (),
         limits=comparison.limits,
         tables=tables,
@@ -251,7 +239,7 @@ def people_report(comparison: PeopleComparison) -> Report:
     )
 
 
-def _row(each: Trial) -> dict[str, Any]:
+def _row(each: user_study.Trial) -> dict[str, Any]:
     return {
         "task": each.task,
         "condition": each.condition,

@@ -6,20 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from handrail.datasets.presentation import wording
 from handrail.datasets.presentation.markup import folded, items, page, paragraph, section
 from handrail.datasets.presentation.table import Cell, Table
-from handrail.datasets.presentation.wording import (
-    DASH,
-    WITH_TRAINING,
-    number,
-    p_alone,
-    percent,
-    percent_span,
-    points,
-    points_span,
-    signed,
-    span,
-)
 from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure, Value
 from handrail.datasets.statistics.resampling import Interval
 from handrail.datasets.storage.atomic import explained, write_whole
@@ -33,7 +22,7 @@ def shown(value: Value, *more: str) -> Cell:
     if value.estimate is None:
         return Cell("missing", "quiet", value.reason, "; ".join(more))
     share = value.measure.unit == SHARE
-    text, spanned = (percent, percent_span) if share else (number, span)
+    text, spanned = (wording.percent, wording.percent_span) if share else (wording.number, wording.span)
     training = f"{spanned(value.nested)} with training" if value.nested else ""
     below = spanned(value.interval) if value.interval else "", training, *more
     return Cell(text(value.estimate), below="; ".join(filter(None, below)))
@@ -59,7 +48,7 @@ def values_table(
     cells = {(each.measure.name, each.label): shown(each, note(each)) for each in values}
     measures = {each.measure.name: each.measure for each in values}
     found: list[Sequence[Cell | str]] = [
-        [measure_cell(each), *(cells.get((name, label), DASH) for label in labels)]
+        [measure_cell(each), *(cells.get((name, label), wording.DASH) for label in labels)]
         for name, each in measures.items()
     ]
     found += [[name, *(texts[label] for label in labels)] for name, texts in (rows or {}).items()]
@@ -76,13 +65,13 @@ def measure_cell(measure: Measure, ranked: bool = True, mark: str = "") -> Cell:
 def difference_cell(each: Contrast, below: str = "") -> Cell:
     """Return the estimate, bold where a difference was detected."""
     if each.estimate is None:
-        return Cell("missing" if not each.reason else DASH, "quiet", each.reason)
+        return Cell("missing" if not each.reason else wording.DASH, "quiet", each.reason)
     return Cell(_difference(each, each.estimate), "detected" if each.detected else "", below=below)
 
 
 def _difference(each: Contrast, estimate: float) -> str:
-    texts = {SHARE: f"{points(estimate)} points", RATIO: f"× {number(estimate)}"}
-    return texts.get(each.measure.unit, signed(estimate))
+    texts = {SHARE: f"{wording.points(estimate)} points", RATIO: f"× {wording.number(estimate)}"}
+    return texts.get(each.measure.unit, wording.signed(estimate))
 
 
 def sentence(each: Contrast, name: str, *sides: str) -> str:
@@ -99,12 +88,12 @@ def sentence(each: Contrast, name: str, *sides: str) -> str:
 
 
 def _interval(measure: Measure, interval: Interval | None) -> str:
-    return points_span(interval) if measure.unit == SHARE else span(interval)
+    return wording.points_span(interval) if measure.unit == SHARE else wording.span(interval)
 
 
 def _detectable(each: Contrast) -> str:
     seen = each.seen if each.estimate is not None else None
-    return DASH if seen is None else f"{100 * seen:.0f} points"
+    return wording.DASH if seen is None else f"{100 * seen:.0f} points"
 
 
 Column = Callable[[Any], Cell | str]
@@ -114,9 +103,9 @@ COLUMNS: Mapping[str, Column] = {
     "of": lambda each: each.scope,
     "difference": difference_cell,
     "95 %": lambda each: _interval(each.measure, each.interval),
-    WITH_TRAINING: lambda each: _interval(each.measure, each.nested),
-    "p": lambda each: p_alone(None if each.p_adjusted is None else each.p),
-    "p, Holm": lambda each: p_alone(each.p_adjusted),
+    wording.WITH_TRAINING: lambda each: _interval(each.measure, each.nested),
+    "p": lambda each: wording.p_alone(None if each.p_adjusted is None else each.p),
+    "p, Holm": lambda each: wording.p_alone(each.p_adjusted),
     "family": lambda each: f"{each.tests} {each.family}",
     "n": lambda each: ", ".join(map(str, each.counts)),
     "detectable": _detectable,

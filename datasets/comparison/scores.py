@@ -19,15 +19,10 @@ COLUMNS = ["participant", "condition", "score", "value"]
 SOURCE = "source"  # may stand behind them
 PEOPLE, DEMO = "people", "demo data: no people took part"
 MOST_BYTES = 4 * 1024 * 1024
+_WEIGHTED = "NASA-TLX's scales, weighted by how often each was chosen of a pair"
 SCORES = (
     Measure("tlx_raw", "workload (raw TLX)", "0–100", "lower", "mean of NASA-TLX's six scales"),
-    Measure(
-        "tlx_weighted",
-        "workload (weighted TLX)",
-        "0–100",
-        "lower",
-        "NASA-TLX's scales, weighted by how often each was chosen of a pair",
-    ),
+    Measure("tlx_weighted", "workload (weighted TLX)", "0–100", "lower", _WEIGHTED),
     Measure("sus", "usability (SUS)", "0–100", "higher", "System Usability Scale"),
 )
 

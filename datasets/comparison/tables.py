@@ -2,17 +2,11 @@
 
 from collections.abc import Sequence
 
+from handrail.datasets.comparison import report
 from handrail.datasets.comparison.compare import Comparison, EpisodeChoice
 from handrail.datasets.comparison.episodes import FOLLOWS
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.policies import Outcomes
-from handrail.datasets.comparison.report import (
-    contrast_table,
-    difference_cell,
-    measure_cell,
-    shown,
-    values_table,
-)
 from handrail.datasets.presentation import wording
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import DASH, number, percent, span
@@ -43,13 +37,13 @@ def collection_table(view: EpisodeChoice) -> Table:
         "task": {group.label: shown_tasks(group.tasks) for group in view.groups},
         "robot": {group.label: group.info.robot_type or DASH for group in view.groups},
     }
-    return values_table(view.collecting, rows=rows)
+    return report.values_table(view.collecting, rows=rows)
 
 
 def collection_differences_table(comparison: Comparison) -> Table:
     """Return how each group differs from the baseline in success and in successes an hour."""
     columns = ("measure", "group", "difference", "95 %", "p, Holm", "detectable")
-    return contrast_table(comparison.collecting, columns)
+    return report.contrast_table(comparison.collecting, columns)
 
 
 def policy_tables(outcomes: Outcomes) -> list[Table]:
@@ -67,8 +61,8 @@ def policy_tables(outcomes: Outcomes) -> list[Table]:
     }
     columns = ("group", "difference", "95 %", wording.WITH_TRAINING, "p, Holm", "family", "detectable")
     caption = f"95 %: {wording.THESE_POLICIES}"
-    differences = contrast_table(outcomes.differences, columns, "Success of policies", caption)
-    return [values_table(outcomes.values, rows=rows), differences]
+    differences = report.contrast_table(outcomes.differences, columns, "Success of policies", caption)
+    return [report.values_table(outcomes.values, rows=rows), differences]
 
 
 def metrics_table(comparison: Comparison, label: str) -> Table:
@@ -79,11 +73,11 @@ def metrics_table(comparison: Comparison, label: str) -> Table:
     found = [e for e in views[0].values() if any(values[e.measure.name][side].known.size for side in sides)]
 
     def mean(each: Contrast, side: str) -> Cell:
-        return shown(values[each.measure.name][side])
+        return report.shown(values[each.measure.name][side])
 
     def title(each: Contrast) -> Cell:
         follows = abs(each.follows_length or 0.0) >= FOLLOWS and each.measure.name != "length"
-        return measure_cell(each.measure, not comparison.unlike, " ↔" if follows else "")
+        return report.measure_cell(each.measure, not comparison.unlike, " ↔" if follows else "")
 
     def tested(each: Contrast, shown: Cell | str) -> Cell | str:
         return shown if each.interval else Cell(DASH, "quiet", each.reason or _UNTESTED)
@@ -98,13 +92,13 @@ def metrics_table(comparison: Comparison, label: str) -> Table:
         "same length": lambda each: tested(each, _at_length(each)),
         "p, Holm": lambda each: tested(each, wording.p_alone(each.p_adjusted)),
     }
-    return contrast_table(found, (), f"{label} against {comparison.baseline}", more=columns)
+    return report.contrast_table(found, (), f"{label} against {comparison.baseline}", more=columns)
 
 
 def _estimate(each: Contrast) -> Cell:
     if each.incomparable:
         return Cell("not comparable", "quiet", each.reason)
-    return difference_cell(each, span(each.interval) if each.interval else "")
+    return report.difference_cell(each, span(each.interval) if each.interval else "")
 
 
 def _at_length(each: Contrast) -> Cell:

@@ -12,15 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.editing.config import (
-    DeleteConfig,
-    EditConfig,
-    KeepConfig,
-    RelabelConfig,
-    RenameConfig,
-    SplitConfig,
-    TrimConfig,
-)
+from handrail.datasets.editing import config as verbs
 from handrail.datasets.editing.merge import Edited, copy_episodes
 from handrail.datasets.editing.source import EditSource, opened
 from handrail.datasets.format.data_file import data_files
@@ -40,11 +32,11 @@ _ENDINGS = {"failed": False, "succeeded": True}
 _ROUNDING = 1e-9
 
 
-def edit(config: EditConfig) -> list[Edited]:
+def edit(config: verbs.EditConfig) -> list[Edited]:
     """Do what a config says and return the datasets that were written."""
     config.check()
     with opened([config.root], config.target, config.verify) as (source,):
-        if not isinstance(config, SplitConfig):
+        if not isinstance(config, verbs.SplitConfig):
             types = _types(config, source.types)
             slices = _slices(config, source)
             return [copy_episodes([source], config.target, slices, config.name, config.in_place, types)]
@@ -56,20 +48,20 @@ def edit(config: EditConfig) -> list[Edited]:
         return [replace(each, root=config.target / each.root.name) for each in edited]
 
 
-def _types(config: EditConfig, types: ColumnTypes) -> ColumnTypes:
+def _types(config: verbs.EditConfig, types: ColumnTypes) -> ColumnTypes:
     """Return the extra columns after an edit."""
-    if isinstance(config, RelabelConfig):
+    if isinstance(config, verbs.RelabelConfig):
         return {**_LABELS, **types}
-    return {**types, TRIMMED: pa.int64()} if isinstance(config, TrimConfig) else types
+    return {**types, TRIMMED: pa.int64()} if isinstance(config, verbs.TrimConfig) else types
 
 
-def _slices(config: EditConfig, source: EditSource) -> Iterator[EpisodeSlice]:
+def _slices(config: verbs.EditConfig, source: EditSource) -> Iterator[EpisodeSlice]:
     """Return what a dataset's episodes become."""
     words, everything = getattr(config, "episodes", ()), range(len(source.rows))
     chosen = set(_chosen("--episodes", words, source.successes))
-    if isinstance(config, DeleteConfig | KeepConfig):
-        return source.slices(chosen if isinstance(config, KeepConfig) else set(everything) - chosen)
-    if isinstance(config, RenameConfig) and config.old_task:
+    if isinstance(config, verbs.DeleteConfig | verbs.KeepConfig):
+        return source.slices(chosen if isinstance(config, verbs.KeepConfig) else set(everything) - chosen)
+    if isinstance(config, verbs.RenameConfig) and config.old_task:
         tasks = {task for row in source.rows for task in row["tasks"]}
         if config.old_task not in tasks:
             raise unknown_name("task", config.old_task, tasks)
@@ -79,15 +71,15 @@ def _slices(config: EditConfig, source: EditSource) -> Iterator[EpisodeSlice]:
     )
 
 
-def _changed(config: EditConfig, source: EditSource, whole: EpisodeSlice) -> EpisodeSlice:
-    if isinstance(config, RelabelConfig):
+def _changed(config: verbs.EditConfig, source: EditSource, whole: EpisodeSlice) -> EpisodeSlice:
+    if isinstance(config, verbs.RelabelConfig):
         success = config.label == "success"
         reason = "" if success else config.reason or "relabelled"
         return replace(whole.saying(success=success, failure_reason=reason), success=success)
-    if isinstance(config, RenameConfig):
+    if isinstance(config, verbs.RenameConfig):
         old = {task for task in whole.record.tasks if not config.old_task or task == config.old_task}
         return replace(whole, sentences=dict.fromkeys(old, config.task))
-    assert isinstance(config, TrimConfig)
+    assert isinstance(config, verbs.TrimConfig)
     number = whole.record.episode
     row, columns = source.rows[number], [each for each in (_STATE, _SUCCESS) if each in source.info.features]
     with data_files() as files:

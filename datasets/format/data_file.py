@@ -13,7 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from handrail.datasets.format.tables import numbers, open_parquet, to_numpy
+from handrail.datasets.format.tables import numbers, open_parquet, parquet_writer, to_numpy
 
 _EPISODE = "episode_index"
 _SEARCHED = [_EPISODE, "index"]  # columns whose statistics readers look rows up by
@@ -31,13 +31,7 @@ class GrowingDataFile:
             OSError: The disk does not take it.
         """
         self._sink = pa.OSFile(str(path), "wb")
-        self._writer = pq.ParquetWriter(
-            self._sink,
-            schema,
-            compression="snappy",
-            write_statistics=_SEARCHED,  # type: ignore[arg-type]
-            write_page_checksum=True,
-        )
+        self._writer = parquet_writer(self._sink, schema, write_statistics=_SEARCHED)
         self._waiting: list[pa.Table] = []
 
     @property

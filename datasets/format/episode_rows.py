@@ -19,6 +19,7 @@ import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
+from handrail.datasets.format import tables
 from handrail.datasets.format.info_file import Episodes, Frames, inside
 from handrail.datasets.format.layout import Layout, chunk_and_file, file_index_of
 from handrail.datasets.format.manifest import Manifest
@@ -31,15 +32,6 @@ from handrail.datasets.format.stats import (
     Stats,
     stats_from_lists,
     stats_to_lists,
-)
-from handrail.datasets.format.tables import (
-    flat_numbers,
-    lists,
-    numbers,
-    open_parquet,
-    parquet_bytes,
-    plain_values,
-    scalars,
 )
 from handrail.datasets.storage.strict_json import parse_json
 
@@ -99,7 +91,7 @@ class EpisodeRows:
             ForeignRowError: The file is whole, but another tool wrote it.
             OSError, pyarrow.ArrowException, ValueError, KeyError: The file is not whole, or has no row.
         """
-        with open_parquet(path) as file:
+        with tables.open_parquet(path) as file:
             marks = file.schema_arrow.metadata or {}
             if _FILES not in marks:
                 raise ForeignRowError(
@@ -155,7 +147,7 @@ class EpisodeRows:
                 nested, kind = 0, column.type
                 while pa.types.is_nested(kind):
                     nested, kind = nested + 1, kind.value_type  # type: ignore[attr-defined]
-                values = flat_numbers(column).reshape(len(self), -1, *[1] * (nested - 1))
+                values = tables.flat_numbers(column).reshape(len(self), -1, *[1] * (nested - 1))
                 found.setdefault(key, {})[statistic] = np.where(np.isfinite(values), values, 0)
         return found
 
@@ -190,7 +182,7 @@ def plain_names(file: pq.ParquetFile) -> list[str]:
 def table_rows(table: pa.Table) -> list[dict[str, Any]]:
     """Return a table's columns, statistics left out, as a dict a row."""
     names = [name for name in table.column_names if not name.startswith(STATS)]
-    columns = [plain_values(table.column(name)) for name in names]
+    columns = [tables.plain_values(table.column(name)) for name in names]
     return [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]
 
 
@@ -207,8 +199,8 @@ def rows_bytes(
     """
     columns = {
         "episode_index": _whole([record.episode for record in records]),
-        "tasks": lists(
-            scalars([task for record in records for task in record.tasks], pa.string()),
+        "tasks": tables.lists(
+            tables.scalars([task for record in records for task in record.tasks], pa.string()),
             [len(record.tasks) for record in records],
         ),
         "length": _whole([record.length for record in records]),
@@ -220,9 +212,9 @@ def rows_bytes(
         columns |= _place(f"videos/{key}", records)
         for name, frames in (("from", 0), ("to", 1)):
             seconds = [(record.offset + frames * record.length) / manifest.fps for record in records]
-            columns[f"videos/{key}/{name}_timestamp"] = numbers(seconds, pa.float64())
+            columns[f"videos/{key}/{name}_timestamp"] = tables.numbers(seconds, pa.float64())
     for name, kind in types.items():
-        columns[name] = scalars([record.columns.get(name) for record in records], kind)
+        columns[name] = tables.scalars([record.columns.get(name) for record in records], kind)
     stats = [record.stats or {} for record in records]
     for key in stats[0]:
         found = _statistics([each[key] for each in stats])
@@ -240,9 +232,9 @@ def _statistics(stats: Sequence[Statistics]) -> dict[str, pa.Array]:
     found: dict[str, pa.Array] = {}
     for names, kind in ((MEASURED, pa.float64()), (("count",), pa.int64())):
         values = np.array([each[name] for name in names for each in stats])
-        nested = numbers(values.reshape(-1), kind)
+        nested = tables.numbers(values.reshape(-1), kind)
         for size in reversed(values.shape[1:]):
-            nested = lists(nested, np.full(len(nested) // size, size))
+            nested = tables.lists(nested, np.full(len(nested) // size, size))
         found |= {name: nested.slice(place * len(stats), len(stats)) for place, name in enumerate(names)}
     return found
 
@@ -254,13 +246,15 @@ def with_checksums(path: Path, files: Mapping[str, Checksum]) -> bytes:
 
 
 def _read(path: Path) -> pa.Table:
-    with open_parquet(path) as file:
+    with tables.open_parquet(path) as file:
         return file.read(use_threads=False)
 
 
 def _bytes(table: pa.Table, marks: Mapping[bytes, str | bytes]) -> bytes:
     texts = [field.name for field in table.schema if field.type == pa.string()] if len(table) > 1 else False
-    return parquet_bytes(table.replace_schema_metadata(marks), texts, statistics=False, arrow_schema=False)
+    return tables.parquet_bytes(
+        table.replace_schema_metadata(marks), texts, statistics=False, arrow_schema=False
+    )
 
 
 def _files_json(files: Mapping[str, Checksum]) -> str:
@@ -275,4 +269,4 @@ def _place(stream: str, records: Sequence[EpisodeRecord]) -> dict[str, pa.Array]
 
 
 def _whole(values: Sequence[int]) -> pa.Array:
-    return numbers(values, pa.int64())
+    return tables.numbers(values, pa.int64())

@@ -18,17 +18,8 @@ from handrail.controllers.arrays import are_finite
 from handrail.controllers.errors import HandrailError, shown
 
 NUMBERS = (
-    "float32",
-    "float64",
-    "int8",
-    "int16",
-    "int32",
-    "int64",
-    "uint8",
-    "uint16",
-    "uint32",
-    "uint64",
-    "bool",
+    *("float32", "float64", "int8", "int16", "int32", "int64"),
+    *("uint8", "uint16", "uint32", "uint64", "bool"),
 )
 DTYPES = (*NUMBERS, "string", "video")
 POLICY_PREFIXES = ("observation", "action")

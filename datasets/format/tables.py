@@ -34,6 +34,11 @@ def open_parquet(path: Path) -> pq.ParquetFile:
     return pq.ParquetFile(regular(path), page_checksum_verification=True)
 
 
+def parquet_writer(sink: pa.NativeFile, schema: pa.Schema, **settings: Any) -> pq.ParquetWriter:
+    """Return what writes a file of rows: every page with a checksum, see `open_parquet`."""
+    return pq.ParquetWriter(sink, schema, compression="snappy", write_page_checksum=True, **settings)
+
+
 def numbers(values: Any, kind: pa.DataType) -> pa.Array:
     """Return numbers or truth values, `(N,)`, as an Arrow array of a number type or bool."""
     if kind == pa.bool_():
@@ -148,15 +153,8 @@ def parquet_bytes(
         arrow_schema: Whether Arrow's own description is kept too; lists of one length need it.
     """
     sink = pa.BufferOutputStream()
-    with pq.ParquetWriter(
-        sink,
-        table.schema,
-        compression="snappy",
-        use_dictionary=dictionary,  # type: ignore[arg-type]
-        write_statistics=statistics,
-        store_schema=arrow_schema,
-        write_page_checksum=True,
-    ) as writer:
+    settings = {"use_dictionary": dictionary, "write_statistics": statistics, "store_schema": arrow_schema}
+    with parquet_writer(sink, table.schema, **settings) as writer:
         writer.write_table(table)
         if not arrow_schema:  # which would carry them
             writer.add_key_value_metadata(table.schema.metadata or {})

@@ -8,16 +8,8 @@ from typing import Any
 
 from handrail.datasets.printable import printable
 
-COLOURS = (
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#cc79a7",
-    "#e69f00",
-    "#56b4e9",
-    "#5b4b8a",
-    "#7f7f7f",
-)  # Okabe–Ito
+# Okabe–Ito
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b4b8a", "#7f7f7f")
 INK, GREY, FAINT = "#1d2733", "#8a94a0", "#e3e7ec"
 
 

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from rich import box
 from rich import table as rich_table
@@ -14,6 +15,7 @@ from handrail.datasets.printable import printable
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?|[-–]|")
 _WHOLE = 14  # a cell of so many letters is not broken
 _GAP = 2  # between two columns
+_FRAME: Any = {"box": box.SIMPLE_HEAD, "padding": (0, 1, 0, 0), "pad_edge": False, "show_edge": False}
 
 
 @dataclass(frozen=True)
@@ -81,14 +83,7 @@ class Table:
         widths = self._widths(part, width)
         columns = [self._column(column, widths[column]) for column in part]
         tall = any("\n" in cell or len(cell) > widths[each] for each in part for cell in self._cells(each))
-        table = rich_table.Table(
-            *columns,
-            box=box.SIMPLE_HEAD,
-            leading=int(tall),
-            padding=(0, 1, 0, 0),
-            pad_edge=False,
-            show_edge=False,
-        )
+        table = rich_table.Table(*columns, leading=int(tall), **_FRAME)
         for row in self.rows:
             table.add_row(*(Text(_text(row[column])) for column in part))
         return table
@@ -107,12 +102,8 @@ class Table:
     def _column(self, column: int, width: int) -> rich_table.Column:
         cells = self._cells(column)
         numbers = all(map(_NUMBER.fullmatch, cells)) and any(map(str.strip, "".join(cells).strip("–")))
-        return rich_table.Column(
-            Text(printable(self.headings[column])),
-            width=width,
-            overflow="fold",
-            justify="right" if numbers else "left",
-        )
+        heading, side = Text(printable(self.headings[column])), "right" if numbers else "left"
+        return rich_table.Column(heading, width=width, overflow="fold", justify=side)
 
 
 def _text(cell: Cell | str) -> str:

@@ -12,15 +12,8 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import DataFiles
+from handrail.datasets.reading import naming
 from handrail.datasets.reading.columns import ColumnNames
-from handrail.datasets.reading.naming import (
-    gripper_entries,
-    hand_names,
-    is_velocity,
-    point_entries,
-    position_entries,
-    same_thing,
-)
 from handrail.datasets.reading.reader import DatasetInfo
 
 
@@ -90,7 +83,7 @@ class Demonstration(Episode):
     @cached_property
     def hands(self) -> tuple[str, ...]:
         """Names of the hands that state and action tell apart; () of one hand, which has none."""
-        return hand_names((*self.entries("state"), *self.entries("action")))
+        return naming.hand_names((*self.entries("state"), *self.entries("action")))
 
     def of_hand(self, hand: str) -> "Demonstration":
         """Return it with motion and gripper of one hand of several."""
@@ -104,7 +97,7 @@ class Demonstration(Episode):
 
         Of h hands one after the other.
         """
-        state, entries = self.matrix("state"), point_entries(self.entries("state"), self.hand)
+        state, entries = self.matrix("state"), naming.point_entries(self.entries("state"), self.hand)
         return state[:, entries] if entries else self.configuration
 
     @property
@@ -115,12 +108,12 @@ class Demonstration(Episode):
     @property
     def motion_is_tool(self) -> bool:
         """Whether `motion` is the tool's position [m]."""
-        return bool(point_entries(self.entries("state"), self.hand))
+        return bool(naming.point_entries(self.entries("state"), self.hand))
 
     @cached_property
     def configuration(self) -> FloatArray:
         """Where the robot is: the positions in the state, `(N, c)`, or all of it where no name says."""
-        state, entries = self.matrix("state"), position_entries(self.entries("state"), self.hand)
+        state, entries = self.matrix("state"), naming.position_entries(self.entries("state"), self.hand)
         if self.hand and not entries:
             raise DoesNotApply(f"no position in the state is of {self.hand}")
         return state[:, entries] if entries else state
@@ -137,7 +130,7 @@ class Demonstration(Episode):
     @cached_property
     def pairs(self) -> tuple[tuple[int, int], ...]:
         """Entries of action and state that mean the same in the same unit."""
-        found = same_thing(self.entries("action"), self.entries("state"))
+        found = naming.same_thing(self.entries("action"), self.entries("state"))
         if not found:
             raise DoesNotApply("no entry of the action has its counterpart in the state, by name")
         return tuple(found)
@@ -156,8 +149,8 @@ class Demonstration(Episode):
     def relative_action(self) -> FloatArray:
         """The action, positions taken relative to where the robot is, `(N, a)`."""
         action, names = self.matrix("action").copy(), self.entries("action")
-        for place, measured in same_thing(names, self.entries("state")):
-            if not is_velocity(names[place]):
+        for place, measured in naming.same_thing(names, self.entries("state")):
+            if not naming.is_velocity(names[place]):
                 action[:, place] -= self.matrix("state")[:, measured]
         return action
 
@@ -165,7 +158,7 @@ class Demonstration(Episode):
     def grippers(self) -> FloatArray:
         """The opening of each hand's gripper, commanded or else measured, `(N, h)`."""
         for part in ("action", "state"):
-            if places := gripper_entries(self.entries(part), self.hand):
+            if places := naming.gripper_entries(self.entries(part), self.hand):
                 return self.matrix(part)[:, places]
         raise DoesNotApply("no entry of action or state is called gripper")
 

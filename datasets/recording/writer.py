@@ -81,11 +81,7 @@ class EpisodeWriter:
 
     @classmethod
     def create(
-        cls,
-        root: str | Path,
-        manifest: Manifest,
-        overwrite: bool = False,
-        types: ColumnTypes | None = None,
+        cls, root: str | Path, manifest: Manifest, overwrite: bool = False, types: ColumnTypes | None = None
     ) -> Self:
         """Start a new dataset.
 

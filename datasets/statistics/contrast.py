@@ -18,14 +18,8 @@ LEVEL = 0.05  # below which a p that is adjusted for their number counts
 POWER = 0.8
 SHARE, RATIO = "share", "ratio"  # units that are shown as percentage points, and as a factor
 _OF_CSV = (
-    "estimate",
-    "interval",
-    "spread",
-    "p",
-    "p_adjusted",
-    "at_length",
-    "at_length_interval",
-    "follows_length",
+    *("estimate", "interval", "spread", "p", "p_adjusted"),
+    *("at_length", "at_length_interval", "follows_length"),
 )
 _HIDDEN = ("measure", "scope", "label", "values", "incomparable", "largest", "null", "reason")
 _NO_SPREAD = 1e-9  # of a value: a standard deviation below is rounding

@@ -92,9 +92,7 @@ def mcnemar_by_scene(differences: IntArray, scenes: Sequence[int]) -> float:
 
 
 def unpaired_shares(
-    first: Sequence[bool],
-    second: Sequence[bool],
-    scenes: tuple[Sequence[int], Sequence[int]] | None = None,
+    first: Sequence[bool], second: Sequence[bool], scenes: tuple[Sequence[int], Sequence[int]] | None = None
 ) -> Estimate:
     """Compare successes of different trials under two conditions.
 

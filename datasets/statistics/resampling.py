@@ -35,17 +35,11 @@ def bootstrap(
     resamples: int = 0,
 ) -> Interval:
     """Return the 95 % bootstrap interval (percentiles) of a statistic, which takes samples and an axis."""
-    count = resamples or RESAMPLES
+    count, batch = resamples or RESAMPLES, _batch(samples)
     from scipy import stats  # a recording must start at once
 
     found = stats.bootstrap(
-        samples,
-        statistic,
-        n_resamples=count,
-        batch=_batch(samples),
-        paired=paired,
-        method="percentile",
-        rng=rng,
+        samples, statistic, n_resamples=count, batch=batch, paired=paired, method="percentile", rng=rng
     )
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
@@ -70,16 +64,11 @@ def permutation_p(
         tests: How many there are in the family at most: B is 80 times that where it is more than
             4000, so that the smallest p is half of what Holm asks.
     """
-    kind = "samples" if paired else "independent"
+    kind, count = "samples" if paired else "independent", max(RESAMPLES, 80 * tests)
     from scipy import stats  # a recording must start at once
 
     found = stats.permutation_test(
-        samples,
-        statistic,
-        permutation_type=kind,
-        n_resamples=max(RESAMPLES, 80 * tests),
-        batch=_batch(samples),
-        rng=rng,
+        samples, statistic, permutation_type=kind, n_resamples=count, batch=_batch(samples), rng=rng
     )
     return float(found.pvalue)
 

@@ -11,21 +11,14 @@ from websockets.typing import Origin
 
 _SAYS = 0.025  # from one input to the next at most [s]
 _PATIENCE = 300.0  # until a frame is as it is waited for [s]
+_PLAIN: Any = {"compression": None, "max_size": None, "ping_interval": None, "open_timeout": _PATIENCE}
 
 
 def connected(address: str, name: str, **options: Any) -> ClientConnection:
     """Return the connection of a page."""
     parts = urlsplit(address)
-    made = connect(
-        f"ws://{parts.netloc}/drive?page={name}",
-        origin=Origin(f"{parts.scheme}://{parts.netloc}"),
-        compression=None,
-        max_size=None,
-        ping_interval=None,
-        open_timeout=_PATIENCE,
-        **options,
-    )
-    return made.__enter__()  # whoever asked closes it
+    place, origin = f"ws://{parts.netloc}/drive?page={name}", Origin(f"{parts.scheme}://{parts.netloc}")
+    return connect(place, origin=origin, **_PLAIN, **options).__enter__()  # whoever asked closes it
 
 
 class Page:

@@ -6,17 +6,9 @@ import numpy as np
 
 from handrail.collect.operators.modes import Focus, TeleopMode
 from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripted import steering
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.placement import straight_solution
-from handrail.collect.operators.scripted.steering import (
-    FOLLOW,
-    Gains,
-    MotionGoal,
-    Target,
-    full_stick,
-    hand_errors,
-    hand_twist,
-)
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
@@ -47,18 +39,18 @@ class LargeTurn:
         view: of the scene, at the beginning of an episode.
     """
 
-    def __init__(self, model: RobotModel, gains: Gains, view: View) -> None:
+    def __init__(self, model: RobotModel, gains: steering.Gains, view: View) -> None:
         self._model, self._gains = model, gains
         self._base = len(model.description.base.joints)
         self._collision = CollisionModel(model, view.task.obstacles)
         self._goal = view.state.q.copy()
         self._thought = b""
 
-    def is_ahead(self, target: Target, q: FloatArray) -> bool:
+    def is_ahead(self, target: steering.Target, q: FloatArray) -> bool:
         """Return whether the hand has to turn far to where a goal leads."""
-        return float(np.linalg.norm(hand_errors(self._model.pose(q), target.hand)[3:])) > _LARGE
+        return float(np.linalg.norm(steering.hand_errors(self._model.pose(q), target.hand)[3:])) > _LARGE
 
-    def arm_velocity(self, target: Target, q: FloatArray, base: FloatArray) -> FloatArray:
+    def arm_velocity(self, target: steering.Target, q: FloatArray, base: FloatArray) -> FloatArray:
         """Return the velocity straight to where the arm's joints belong, (n − b,) [rad/s].
 
         Args:
@@ -96,7 +88,7 @@ class InputMap(ABC):
             made to the measure of the stick for the hand (`as_fine`).
     """
 
-    def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
+    def __init__(self, model: RobotModel, mode: TeleopMode, gains: steering.Gains) -> None:
         self.mode = mode
         self._masks: dict[Focus, BoolArray] = {}
         self.channels = Channels.of(model.description)
@@ -105,7 +97,7 @@ class InputMap(ABC):
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
         moved = np.sum([self.channels.moving(hand) for hand in range(len(self.channels.hands))], axis=0)
         self._used = (moved < 2) | (np.arange(model.size) < self._base)  # a torso is slow: it is left alone
-        self.full, joints = full_stick(self.channels, gains), self.channels.joint_slice
+        self.full, joints = steering.full_stick(self.channels, gains), self.channels.joint_slice
         self.fine = self.full.copy()
         self.fine[joints] *= as_fine(model, self.full[joints], gains.full[:6])
 
@@ -114,7 +106,7 @@ class InputMap(ABC):
         """Begin an episode with a person."""
 
     @abstractmethod
-    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
+    def wanted(self, goal: steering.MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the channels that the operator owns now, (m,), and how far they want each input, (m,)."""
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
@@ -147,7 +139,7 @@ class StickMap(InputMap):
             self._masks[focus] = self.channels.mask(*self.mode.owned(focus, self._model.hand.name))
         return self._masks[focus]
 
-    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
+    def wanted(self, goal: steering.MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask, and the goal on every channel of the mode, within full stick, (m,)."""
         mask = self.mask(goal.focus)
         values = np.zeros(self.channels.size)
@@ -160,22 +152,24 @@ class StickMap(InputMap):
             values[self.channels.joint_slice] = self._joint_velocities(goal, state.q)
         return mask, np.minimum(np.maximum(np.where(mask, values, 0.0), -self.full), self.full)
 
-    def _twists(self, goal: MotionGoal, q: FloatArray) -> dict[int, FloatArray]:
+    def _twists(self, goal: steering.MotionGoal, q: FloatArray) -> dict[int, FloatArray]:
         """Return what is wanted of hands, by number: of each of a pair what brings it to its own place."""
         target = goal.target
         if target is not None and target.apart:
             tools = [self._model.pose(q, hand.named("tool")) for hand in self._model.description.hands]
             pairs = zip(tools, target.of_hands(tools), strict=True)
-            return dict(enumerate(hand_twist(tool, place, self._gains, target.pace) for tool, place in pairs))
+            twists = (steering.hand_twist(tool, place, self._gains, target.pace) for tool, place in pairs)
+            return dict(enumerate(twists))
         going = self._model.number
         if target is not None and target.also is not None:
             tool = self._model.pose(q, self._model.description.hands[1 - going].named("tool"))
-            return {going: goal.hand, 1 - going: hand_twist(tool, target.also, self._gains, target.pace)}
+            other = steering.hand_twist(tool, target.also, self._gains, target.pace)
+            return {going: goal.hand, 1 - going: other}
         if target is not None and target.second is not None:
             return {going ^ target.second: goal.hand, 1 - (going ^ target.second): np.zeros(6)}
         return {going: goal.hand}
 
-    def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
+    def _joint_velocities(self, goal: steering.MotionGoal, q: FloatArray) -> FloatArray:
         """Return what the expert makes of a goal on all joints, (n,), within full stick."""
         base = turned(goal.base, q[2]) if self._base else np.zeros(0)
         twists = self._twists(goal, q)
@@ -213,7 +207,7 @@ class LeaderArmMap(StickMap):
         super().reset(view, settings, rng)
         self._leader, self._time = view.state.q[self._base :].copy(), view.state.time
 
-    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
+    def wanted(self, goal: steering.MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask, base stick and arm together, and how fast the leader shall be moved."""
         velocity, values = self._joint_velocities(goal, state.q), np.zeros(self.channels.size)
         if self._base:
@@ -228,7 +222,7 @@ class LeaderArmMap(StickMap):
         self._leader = np.clip(self._leader + elapsed * moved[self._arm], lower, upper)
         self._time = state.time
         sent = moved.copy()
-        sent[self._arm] += FOLLOW * (self._leader - state.q[self._base :])
+        sent[self._arm] += steering.FOLLOW * (self._leader - state.q[self._base :])
         return sent
 
     def raw(self, moved: FloatArray) -> FloatArray:

@@ -9,18 +9,10 @@ import numpy as np
 
 from handrail.collect.operators.modes import Focus
 from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripted import steering
 from handrail.collect.operators.scripted.placement import standing_point
-from handrail.collect.operators.scripted.steering import (
-    Gains,
-    MotionGoal,
-    Target,
-    base_errors,
-    base_twist,
-    hand_twist,
-    pose_errors,
-)
 from handrail.collect.world.task import TaskState
-from handrail.collect.world.tasks.furniture import floor_obstacles
+from handrail.collect.world.tasks.obstacles import floor_obstacles
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose, RobotModel
 
@@ -29,7 +21,7 @@ _ROUTE_CLEARANCE = 0.25  # of the chassis behind the floor obstacles, and before
 
 
 @dataclass(frozen=True)
-class ScriptPhase(Target):
+class ScriptPhase(steering.Target):
     """One thing to do: get the hand, or the base, to a target."""
 
     name: str = ""  # what it is, for whoever plans anew after it
@@ -50,10 +42,10 @@ class ScriptPhase(Target):
     def is_reached(self, view: View) -> bool:
         """Return whether the base, or the hand, is near enough."""
         if self.focus == "base":
-            *way, turn = base_errors(view.state.q, self.base)
+            *way, turn = steering.base_errors(view.state.q, self.base)
             return bool(np.hypot(*way) < self.distance and abs(turn) < self.angle)
         tool = self.steered(view.task)
-        distance, angle = pose_errors(tool, self.hand)
+        distance, angle = steering.pose_errors(tool, self.hand)
         if self.beside:
             *across, along = tool.rotation.T @ (tool.position - self.hand.position)
             distance = max(abs(along), np.hypot(*across) * self.distance / self.beside)
@@ -69,7 +61,7 @@ class PhasedScript(ABC):
         drives: whether the operator drives the base by itself from place to place.
     """
 
-    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
+    def __init__(self, model: RobotModel, gains: steering.Gains, drives: bool) -> None:
         self._model, self._gains, self._drives = model, gains, drives
         self._scale, self._grip = model.description.world.scale, model.description.world.grip
 
@@ -90,7 +82,7 @@ class PhasedScript(ABC):
         self._phases, self._entered = phases, time
         self._reached_at: float | None = None
 
-    def motion_goal(self, view: View) -> MotionGoal:
+    def motion_goal(self, view: View) -> steering.MotionGoal:
         """Return what is wanted now, and go to the next phase when this one is done."""
         self._advance(view)
         phase, hands = self._phases[0], range(len(self._model.description.hands))
@@ -98,10 +90,10 @@ class PhasedScript(ABC):
         other = phase.gripper * bool(phase.apart) if other is None else other
         grippers = tuple(phase.gripper if hand == going else other for hand in hands)
         if self._reached_at is not None:
-            return MotionGoal.rest(phase.focus, grippers)
-        hand = hand_twist(phase.steered(view.task), phase.hand, self._gains, phase.pace)
-        base = base_twist(view.state.q, phase.base, self._gains)
-        return MotionGoal(hand, base, phase.focus, phase, grippers)
+            return steering.MotionGoal.rest(phase.focus, grippers)
+        hand = steering.hand_twist(phase.steered(view.task), phase.hand, self._gains, phase.pace)
+        base = steering.base_twist(view.state.q, phase.base, self._gains)
+        return steering.MotionGoal(hand, base, phase.focus, phase, grippers)
 
     def _advance(self, view: View) -> None:
         phase, time = self._phases[0], view.state.time

@@ -38,14 +38,8 @@ class PickPlaceScript(PhasedScript):
         stands = [route.stand(thing, edge) for thing, edge in zip((pick, place), edges, strict=True)]
         ahead, lane = _AHEAD * scale, route.lane
         over = pick[2] + _OVER * scale
-        first = ScriptPhase.at(
-            "stage",
-            np.array([edges[0] - 0.15 * scale, pick[1], over]),
-            down,
-            stands[0],
-            distance=0.10 * scale,
-            angle=0.30,
-        )
+        stage = np.array([edges[0] - 0.15 * scale, pick[1], over])
+        first = ScriptPhase.at("stage", stage, down, stands[0], distance=0.10 * scale, angle=0.30)
         begin = [first]
         if self._drives:
             *across, up = route.drive(view.state.q[:3], stands[0], first.hand, 0.0)

@@ -36,6 +36,7 @@ class ScriptedDevice:
 
 
 _BRISK = Gains(gain=1.8, hand_speed=0.7, joint_rate=1.2, patience=4.0)
+_ERRS = "one stick, one axis at a time, with errors"
 _LEADER = "a small copy of the arm, and a stick for the base"
 DEVICES = Registry(
     "device",
@@ -43,13 +44,7 @@ DEVICES = Registry(
     (
         ScriptedDevice("sticks", "velocity sticks on all channels of a mode", StickMap),
         ScriptedDevice("single_axis", "one stick, one axis at a time", SingleAxisMap, _BRISK, drives=True),
-        ScriptedDevice(
-            "single_axis_erring",
-            "one stick, one axis at a time, with errors",
-            ErringAxisMap,
-            _BRISK,
-            drives=True,
-        ),
+        ScriptedDevice("single_axis_erring", _ERRS, ErringAxisMap, _BRISK, drives=True),
         ScriptedDevice("leader_arm", _LEADER, LeaderArmMap, refractory=_POSITION_ORDER),
     ),
 )

@@ -1,21 +1,13 @@
 """The arbiters by name; light to import."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
-
-from handrail.controllers.registry import Registry
+from handrail.controllers.registry import Buildable, Registry
 
 
-@dataclass(frozen=True)
-class ArbiterSpec:
-    """An arbiter: one entry makes it."""
+class ArbiterSpec(Buildable):
+    """An arbiter: one entry makes it, by `(groups, settings) -> Arbiter`.
 
-    name: str  # as on the command line, and what the dataset says of who decided
-    build: Callable[..., Any] | str
-    """`(groups, settings) -> Arbiter`, or where that is, `module:name`. It gets the `Groups` of the robot's
-    channels and the `ArbiterSettings`."""
-    help: str  # one line
+    It gets the `Groups` of the robot's channels and the `ArbiterSettings`.
+    """
 
 
 _HERE = "handrail.collect.operators.shared"

@@ -28,13 +28,7 @@ from handrail.datasets.reading.reader import read_episodes, read_info
 from handrail.datasets.recording.frames import PICTURE
 from handrail.datasets.storage.strict_json import load_json, read_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.interface.checkpoint import (
-    MIXED,
-    NAME,
-    PolicyMeta,
-    model_folder,
-    read_meta,
-)
+from handrail.policies.imitation.interface.checkpoint import MIXED, NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT, STATE
 from handrail.policies.imitation.interface.origin import origin_of
 from handrail.policies.imitation.interface.trust import check_policy_folder

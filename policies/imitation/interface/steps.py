@@ -241,11 +241,7 @@ class PolicyCompletionStep(PolicyActionStep):
 
 
 def with_steps(
-    before: Any,
-    after: Any,
-    interface: PolicyInterface | None,
-    by: Completion,
-    encoder: Encoder | None = None,
+    before: Any, after: Any, interface: PolicyInterface | None, by: Completion, encoder: Encoder | None = None
 ) -> tuple[Any, Any]:
     """Return a policy's processors with the steps of its interface, so that anybody can run the policy.
 

@@ -17,12 +17,7 @@ from handrail.controllers.versions import TRAINING, versions
 from handrail.datasets.storage.atomic import beside, remove
 from handrail.datasets.storage.lock import FolderLock
 from handrail.policies.imitation.config import TrainConfig
-from handrail.policies.imitation.interface.checkpoint import (
-    MODEL,
-    PolicyMeta,
-    last_checkpoint,
-    read_meta,
-)
+from handrail.policies.imitation.interface.checkpoint import MODEL, PolicyMeta, last_checkpoint, read_meta
 from handrail.policies.imitation.interface.compute import threads
 from handrail.policies.imitation.interface.origin import origin_of
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder

@@ -53,15 +53,8 @@ def _paths(axes: Any, trace: CaseTrace, model: RobotModel) -> None:
     for k, path in enumerate(trace.hands.swapaxes(0, 1)):
         axes.plot(*path[:, :2].T, color=_HAND, lw=2.2, label="_hand" if k else "hand", zorder=6)
     if trace.case.held:
-        axes.plot(
-            *np.array(trace.case.held)[:, :2].T,
-            "*",
-            color=_HAND,
-            ms=15,
-            mec="white",
-            label="held point",
-            zorder=7,
-        )
+        held = np.array(trace.case.held)[:, :2].T
+        axes.plot(*held, "*", color=_HAND, ms=15, mec="white", label="held point", zorder=7)
     axes.set(xlabel="x [m]", ylabel="y [m]", title="from above", aspect="equal")
     axes.legend(loc="upper left")
 

@@ -17,22 +17,16 @@ from handrail.collect.world.tasks.reach import goal_marker
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
 from handrail.scripts.bench.goal_reaching.episode import Conditions
-from handrail.scripts.bench.goal_reaching.metrics import SHOWN, Trace, column, rows_of
+from handrail.scripts.bench.goal_reaching.metrics import METRICS, SHOWN, Trace, column, rows_of
 from handrail.scripts.bench.goal_reaching.run import BenchEpisode
 from handrail.scripts.bench.goal_reaching.tables import PUBLISHED
 
 _BASE, _HAND = COLOURS[:2]
 _WIDTH = 11.0  # [inch]
-_DRAWN = (
-    "final_position_error",
-    "final_orientation_error",
-    "arm_effort",
-    "base_path",
-    "jerkiness",
-    "wall_time_s",
-)
+_DRAWN = tuple(name for name in METRICS if name not in ("success", "length"))
 _LOGARITHMIC = ("final_position_error", "arm_effort", "jerkiness", "wall_time_s")
 _COLUMNS = 4  # panels side by side
+_BOXES = {"flierprops": {"markersize": 2}, "medianprops": {"color": _BASE, "lw": 1.6}}
 
 
 def figures(
@@ -74,14 +68,8 @@ def _distributions(results: Mapping[str, Any], profile: str) -> Any:
     rows = [rows_of(results["episodes"], profile, name) for name in names]
 
     def draw(ax: Any, metric: str) -> None:
-        ax.boxplot(
-            [column(own, metric, known=True) for own in rows],
-            positions=range(len(names)),
-            orientation="horizontal",
-            widths=0.55,
-            flierprops={"markersize": 2},
-            medianprops={"color": _BASE, "lw": 1.6},
-        )
+        values = [column(own, metric, known=True) for own in rows]
+        ax.boxplot(values, positions=range(len(names)), orientation="horizontal", widths=0.55, **_BOXES)
         if metric in _LOGARITHMIC:
             _logarithmic(ax)
         for colour, published in zip((GREY, _HAND), PUBLISHED.values(), strict=True):

@@ -69,6 +69,10 @@ def _to_all(number: int) -> Strike:
     return lambda child, folder, rng: send(number, *session(child.pid))
 
 
+def _limited(which: int, low: int, high: int) -> Strike:
+    return lambda child, folder, rng: child.limit(which, int(rng.integers(low, high)))
+
+
 def _interrupt_twice(child: Child, folder: Path, rng: np.random.Generator) -> None:
     send(signal.SIGINT, *session(child.pid))  # as a terminal does
     time.sleep(rng.uniform(0.05, 0.5))
@@ -125,16 +129,8 @@ FAULTS = (
     Fault("clock jumps forwards", lambda child, _, rng: child.set(shift=rng.uniform(60.0, _FAR)), _FINE),
     Fault("clock jumps backwards", lambda child, _, rng: child.set(shift=-rng.uniform(60.0, _FAR)), _FINE),
     Fault("full disk", _fill, _FAILED, lambda folder: _ballast(folder).unlink(missing_ok=True), needs="disk"),
-    Fault(
-        "files that cannot grow",
-        lambda child, _, rng: child.limit(resource.RLIMIT_FSIZE, int(rng.integers(0, 20_000))),
-        _FAILED,
-    ),
-    Fault(
-        "no more file handles",
-        lambda child, _, rng: child.limit(resource.RLIMIT_NOFILE, int(rng.integers(4, 12))),
-        _FAILED,
-    ),
+    Fault("files that cannot grow", _limited(resource.RLIMIT_FSIZE, 0, 20_000), _FAILED),
+    Fault("no more file handles", _limited(resource.RLIMIT_NOFILE, 4, 12), _FAILED),
     Fault(
         "read-only folder",
         lambda child, folder, rng: _lock_folders(folder),

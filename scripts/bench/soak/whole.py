@@ -5,11 +5,10 @@ import json
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.episode_rows import count_rows
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.digest import CLOCKS, add_frames, digest_of_pictures
-from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.reader import open_dataset
 
 _PLACES = ("index", "episode_index")  # where an episode is in its dataset
 _TRIES = 5  # a file may get another name meanwhile
@@ -26,17 +25,12 @@ def saved_in(root: Path, first: int = 0) -> Saved:
     """
     if not Layout(root).info.is_file():
         return {}
-    info, found = read_info(root), {}
-    names = [
-        name
-        for name, each in info.features.items()
-        if name not in (*CLOCKS, *_PLACES) and each.dtype not in ("video", "image")
-    ]
-    with data_files() as files:
-        for row in read_episodes(root):
-            digest = hashlib.sha256()
-            add_frames(digest, read_rows_of(info, row, names, files))
-            digest.update(digest_of_pictures(info, [row]).encode())
+    found = {}
+    with open_dataset(root) as dataset:
+        for row in dataset.rows:
+            digest, frames = hashlib.sha256(), dataset.frames(row["episode_index"])
+            add_frames(digest, {name: frames[name] for name in frames.keys() - {*CLOCKS, *_PLACES}})
+            digest.update(digest_of_pictures(dataset.info, [row]).encode())
             found[first + row["episode_index"]] = digest.hexdigest()[:16]
     return found
 
