@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.typed import check_settings
 
 CLIENTS: Mapping[str, tuple[str, ...]] = {"lekiwi": ("front", "wrist")}  # the robots, and their cameras
@@ -38,8 +38,7 @@ class ClientConfig:
             if self != ClientConfig():
                 raise HandrailError("--client.*: expected --robot_client too, got none")
             return
-        if robot not in CLIENTS:
-            raise unknown_name("--robot_client", robot, CLIENTS)
+        check_known("--robot_client", (robot,), CLIENTS)
         if operator == NO_SCREEN:
             raise HandrailError(f"--robot_client {robot}: expected another --operator than {NO_SCREEN}")
         check_settings(self, "--client.")

@@ -37,11 +37,6 @@ class CockpitConfig:
         """Whether the page asks for a token."""
         return self.token or not self.is_private
 
-    @property
-    def opens(self) -> bool:
-        """Whether the page opens by itself; a token on a command line could be read by other accounts."""
-        return self.open and not self.asks
-
     def check(self) -> None:
         """Check the settings."""
         if self.host != "localhost":

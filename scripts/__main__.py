@@ -5,7 +5,7 @@ import sys
 from collections.abc import Mapping
 from typing import NoReturn
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.scripts import cli
 from handrail.scripts.commands import COMMANDS, GROUPS
 
@@ -27,8 +27,7 @@ def _run(program: str, name: str, words: list[str]) -> int | None:
         return _list_commands()
     if name == cli.VERSION:
         return cli.print_version("handrail")
-    if name not in COMMANDS:
-        raise unknown_name("command", name, COMMANDS)
+    check_known("command", (name,), COMMANDS)
     verbs = COMMANDS[name].verbs
     if "" in verbs:
         return verbs[""].run(cli.parse(verbs[""].config, program, words))

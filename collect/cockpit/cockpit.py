@@ -7,7 +7,7 @@ waits: what the server does not take at once is dropped. When the loop is late, 
 import io
 import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,6 @@ from handrail.collect.cockpit.snapshot import Snapshots
 from handrail.collect.cockpit.strain import Strain
 from handrail.collect.commands.account import next_commands
 from handrail.collect.config import RecordConfig
-from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
@@ -33,7 +32,6 @@ from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError, check_installed
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.recording.frames import Frame
 
 NEEDED = "the cockpit", ("uvicorn", "starlette", "websockets", "cryptography"), "cockpit"
@@ -45,16 +43,11 @@ class Cockpit:
     """A person at a browser; an operator and an observer.
 
     Args:
-        model: of the robot.
-        modes: that one can change to, by name.
-        first: the mode at the beginning.
+        person: whoever steers.
         server: the page's.
         refuses: what the page may not ask for, of `ASKS`.
-        folder: that the episodes go to.
-        wanted: how many episodes; 0 where nobody said.
-        next: what one can do with them afterwards, a command a line.
         say: is told at the end what was dropped.
-        shared: whether a policy drives beside the person.
+        config: of the recording whose folder and progress the page shows; None where it shows none.
 
     Attributes:
         person: whoever steers.
@@ -62,22 +55,18 @@ class Cockpit:
 
     def __init__(
         self,
-        model: RobotModel,
-        modes: Mapping[str, TeleopMode],
-        first: str,
+        person: Person,
         server: ServerProcess,
         refuses: Collection[str] = (),
-        folder: str = "",
-        wanted: int = 0,
-        next: Sequence[str] = (),
         say: Callable[[str], None] = lambda words: None,
-        shared: bool = False,
+        config: RecordConfig | None = None,
     ) -> None:
-        self._model, self._server, self._say, self._shared = model, server, say, shared
-        self._refuses, self._folder, self._wanted, self._next = refuses, folder, wanted, next
-        self._episodes, self.person = EpisodeList(server), Person(model, modes, first, supervises=shared)
-        self._disk = DiskRoom(Path(folder).absolute()) if folder else None
-        self._strain = Strain()
+        self.person, self._server, self._refuses, self._say = person, server, refuses, say
+        self._folder = str(config.dataset.folder) if config else ""
+        self._wanted = config.dataset.num_episodes if config else 0
+        self._shared = bool(config and config.policy)
+        self._episodes, self._strain = EpisodeList(server), Strain()
+        self._disk = DiskRoom(Path(self._folder).absolute()) if self._folder else None
         Image.preinit()  # else the first picture of an episode waits for that
         self._dropped: dict[str, int] = {}
         self._pictured = self._acted = -math.inf
@@ -136,8 +125,8 @@ class Cockpit:
             counts = ", ".join(f"{count} {why}" for why, count in self._all_dropped.items())
             self._say(f"dropped or refused by the page's server: {counts}")
         saved = self._episodes.saved
-        said = {"saved": saved, "folder": self._folder, "next": list(self._next) if saved else []}
-        self._server.pipe.send_surely(Kind.OVER, said)
+        after = next_commands(Path(self._folder)) if saved and self._folder else []
+        self._server.pipe.send_surely(Kind.OVER, {"saved": saved, "folder": self._folder, "next": after})
         self._server.close()
 
     @property
@@ -175,7 +164,7 @@ class Cockpit:
 
     def _send_stage(self) -> None:
         """Say what there is to draw and to choose from."""
-        env, robot, person = self._env, self._model.description, self.person
+        env, robot, person = self._env, self._env.model.description, self.person
         compiled, channels = env.simulation.mujoco_model, person.meaning.channels
         digest, data = stage.meshes(compiled)
         self._server.keep(f"{digest}.bin", data)
@@ -186,7 +175,7 @@ class Cockpit:
             "time_limit": env.task.time_limit,
             "robot": robot.name,
             "channels": channels.names,
-            "joints": self._model.joints,
+            "joints": env.model.joints,
             "lower": [_known(x) for x in robot.limits.position_lower],
             "upper": [_known(x) for x in robot.limits.position_upper],
             "base": len(channels.base),
@@ -219,22 +208,11 @@ class Cockpit:
 def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], None]) -> Cockpit:
     """Return the cockpit of a recording, and say where it is."""
     check_installed(*NEEDED)
-    modes = build_modes(config, env)
+    person = Person(env.model, build_modes(config, env), config.mode_name, supervises=bool(config.policy))
     server = open_server(config.cockpit, say)
-    folder = config.dataset.folder
-    say(f"Episodes go to {folder}. To end: End recording on the page, or Ctrl-C here.")
-    return Cockpit(
-        env.model,
-        modes,
-        config.mode_name,
-        server,
-        refuses=("undo",) if env.real else (),  # nothing that moved goes back by itself
-        folder=str(folder),
-        wanted=config.dataset.num_episodes,
-        next=next_commands(folder),
-        say=say,
-        shared=bool(config.policy),
-    )
+    say(f"Episodes go to {config.dataset.folder}. To end: End recording on the page, or Ctrl-C here.")
+    refuses = ("undo",) if env.real else ()  # nothing that moved goes back by itself
+    return Cockpit(person, server, refuses, say, config)
 
 
 def _known(limit: float) -> float | None:

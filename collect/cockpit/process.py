@@ -147,6 +147,6 @@ def open_server(config: CockpitConfig, say: Callable[[str], None]) -> ServerProc
     """Return a server; say where its page is, and open it where the settings want that."""
     server = ServerProcess(config, say)
     say(f"Drive at {server.address}")
-    if config.opens:
+    if config.open and not config.asks:  # other accounts could read a token on a command line
         webbrowser.open(server.address)
     return server

@@ -10,14 +10,7 @@ from handrail.collect.world.gl import MjData, MjModel, mujoco
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.parts import EndEffector
 
-_KINDS = {
-    mujoco.mjtGeom.mjGEOM_BOX: "box",
-    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
-    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
-    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
-}
+_KINDS = ("box", "capsule", "sphere", "cylinder", "ellipsoid", "mesh")  # that the page draws
 _DIGITS = 4  # of a pose: a tenth of a millimetre
 
 
@@ -25,7 +18,8 @@ def shapes(model: MjModel) -> dict[str, Any]:
     """Return the visible geoms of a model (body, place, shape, colour, mesh), and where each mesh begins."""
     geoms = []
     for index in np.flatnonzero(model.geom_group == VISIBLE_GROUP).tolist():
-        if kind := _KINDS.get(mujoco.mjtGeom(model.geom_type[index])):
+        kind = mujoco.mjtGeom(model.geom_type[index]).name.removeprefix("mjGEOM_").lower()
+        if kind in _KINDS:
             geom = {
                 "body": int(model.geom_bodyid[index]),
                 "at": _rounded(np.concatenate([model.geom_pos[index], model.geom_quat[index]])),

@@ -6,7 +6,9 @@ import contextlib
 import os
 import select
 import sys
+import termios
 import time
+import tty
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
@@ -57,13 +59,6 @@ class KeyTerminal:
     def open(self) -> None:
         """Take it."""
         try:
-            import termios
-            import tty
-        except ImportError as error:  # Windows
-            raise HandrailError(
-                "keyboard: expected a terminal of Linux or macOS; say --operator browser"
-            ) from error
-        try:
             self._file = os.open(os.ttyname(sys.stdin.fileno()), os.O_RDWR | os.O_NOCTTY)
         except (OSError, ValueError, AttributeError) as error:
             raise HandrailError(
@@ -104,8 +99,6 @@ class KeyTerminal:
         """Put it back as it was."""
         if self._file < 0:
             return
-        import termios
-
         self.write((_KEYS_END if self.tells_releases else b"") + _FOCUS_END)
         with contextlib.suppress(termios.error):
             termios.tcsetattr(self._file, termios.TCSAFLUSH, self._before)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from handrail.collect.devices.device import DeviceInput
 from handrail.collect.processor.units import number
 from handrail.collect.teleop_config import LeaderConfig
-from handrail.controllers.errors import HandrailError, message_of, restated, unknown_name
+from handrail.controllers.errors import HandrailError, check_known, message_of, restated
 
 if TYPE_CHECKING:
     from lerobot.teleoperators.teleoperator import Teleoperator
@@ -121,8 +121,7 @@ def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
     from lerobot.teleoperators.utils import make_teleoperator_from_config
 
     known = leader_types()
-    if config.type not in known:
-        raise unknown_name("--teleop.type", config.type, known)
+    check_known("--teleop.type", (config.type,), known)
     options = [option.strip() for option in config.options.split(",") if option.strip()]
     if not all("=" in option for option in options):
         raise HandrailError(

@@ -37,14 +37,9 @@ class Cluster:
         self._running: dict[Any, Job] = {}
 
     @property
-    def cores(self) -> int:
-        """How many cores it has; computers may come and go."""
-        return max(1, int(ray.cluster_resources().get("CPU", 1)))
-
-    @property
     def capacity(self) -> int:
-        """How many jobs it takes at a time."""
-        return _AHEAD * self.cores
+        """How many jobs it takes at a time; computers may come and go."""
+        return _AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def start(self, job: Job) -> None:
         """Give a job to the cluster."""

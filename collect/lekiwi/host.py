@@ -7,6 +7,7 @@ parts: a JSON header with `_cams`, then one JPEG a camera (`lerobot/robots/lekiw
 import json
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
@@ -42,8 +43,6 @@ class HostSockets:
         self._commands.setsockopt(zmq.CONFLATE, 1)
         self._observations = self._context.socket(zmq.PUSH)
         self._observations.setsockopt(zmq.SNDHWM, 2)
-        for socket in (self._commands, self._observations):
-            socket.setsockopt(zmq.LINGER, 0)
         try:
             self._commands.bind(f"tcp://{config.address}:{config.port_zmq_cmd}")
             self._observations.bind(f"tcp://{config.address}:{config.port_zmq_observations}")
@@ -61,16 +60,12 @@ class HostSockets:
 
     def send(self, parts: list[bytes]) -> None:
         """Send an observation; while nobody takes it, it is forgotten."""
-        try:
+        with suppress(self._again):
             self._observations.send_multipart(parts, flags=self._nowait)
-        except self._again:
-            return
 
     def close(self) -> None:
-        """Give the ports back."""
-        self._commands.close()
-        self._observations.close()
-        self._context.term()
+        """Give the ports back; what nobody has taken is forgotten."""
+        self._context.destroy(linger=0)
 
 
 def serve(config: HostConfig, say: Callable[[str], None] = print) -> NoReturn:

@@ -16,6 +16,7 @@ from handrail.collect.devices.open_devices import open_device
 from handrail.collect.lerobot.configs import HandrailCockpitConfig, HandrailGamepadConfig
 from handrail.collect.lerobot.sim import HandrailSim
 from handrail.collect.lerobot.teleoperator import SimTeleoperator
+from handrail.collect.operators.person.person import Person
 from handrail.controllers.errors import check_installed
 from handrail.datasets.presentation.terminal import Terminal
 
@@ -36,10 +37,10 @@ class HandrailCockpit(SimTeleoperator):
     def _made(self, robot: HandrailSim) -> Cockpit:
         check_installed(*NEEDED)
         robot.env.render_mode = "rgb_array"  # from the next episode on the robot looks as it does
-        say = Terminal().print
+        mode, say = robot.mode, Terminal().print
         self._server = open_server(self._settings, say)
-        mode = robot.mode
-        return Cockpit(robot.env.model, {mode.name: mode}, mode.name, self._server, refuses=_REFUSED, say=say)
+        person = Person(robot.env.model, {mode.name: mode}, mode.name)
+        return Cockpit(person, self._server, _REFUSED, say)
 
 
 class HandrailGamepad(SimTeleoperator):

@@ -56,13 +56,9 @@ class _ObstacleTable:
 
 
 def parsed_obstacles(tables: Any) -> tuple[Obstacle, ...]:
-    """Return obstacles from their tables."""
+    """Return obstacles from their tables; the controller checks that no two have the same name."""
     listed = check(tables, list[Any], "obstacles")
-    found = [decoded(table, _ObstacleTable, "obstacle") for table in listed]
-    names = [table.name for table in found]
-    if len(set(names)) != len(names):
-        raise HandrailError(f"obstacles: expected each name once, got {', '.join(names)}")
-    return tuple(_placed(table) for table in found)
+    return tuple(_placed(decoded(table, _ObstacleTable, "obstacle")) for table in listed)
 
 
 def _placed(table: _ObstacleTable) -> Obstacle:

@@ -8,7 +8,7 @@ from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
-from handrail.collect.operators.person.person import Phase
+from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_env, build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.user_study.design import ALLOWED
@@ -61,9 +61,8 @@ class Driving:
         refuses = frozenset(ALLOWED) - frozenset(study.allow) | {"practice"}
         if "mask" in refuses:
             refuses |= {"lock"}  # it changes the mask, too
-        self._cockpit = Cockpit(
-            env.model, {name: modes[name] for name in offered}, mode, self._server, refuses
-        )
+        person = Person(env.model, {name: modes[name] for name in offered}, mode)
+        self._cockpit = Cockpit(person, self._server, refuses)
         self._recording = Recording(config, env, self._cockpit)
         self._recording.into(writer)
         self._recording.warm_up(seed)

@@ -43,14 +43,6 @@ def form(study: UserStudy, name: str, rng: np.random.Generator) -> Form:
 
 
 def _item(question: Question) -> Item:
-    least, most = question.bounds
-    return Item(
-        question.name,
-        question.kind,
-        question.text,
-        low=question.low,
-        high=question.high,
-        least=least,
-        most=most,
-        choices=tuple((choice, choice) for choice in question.choices),
-    )
+    ends = question.low, question.high, *question.bounds
+    choices = tuple((choice, choice) for choice in question.choices)
+    return Item(question.name, question.kind, question.text, "", *ends, choices=choices)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from handrail.collect.world.geometry import VISIBLE_GROUP
 from handrail.collect.world.gl import MjData, MjModel, missing_graphics, mujoco
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.errors import check_known
 
 _MOST_GEOMS = 300
 _LASTING = (
@@ -50,8 +50,7 @@ class Painter:
             camera: name of the camera.
         """
         cameras = [model.camera(index).name for index in range(model.ncam)]
-        if camera not in cameras:
-            raise unknown_name("camera", camera, cameras)
+        check_known("camera", (camera,), cameras)
         if model is not self._model:
             self._load(model)
         self._camera.fixedcamid = cameras.index(camera)

@@ -9,7 +9,7 @@ import numpy as np
 
 from handrail.collect.world.scene import FrozenArrays, Scene, SceneObject
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.errors import check_known
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
@@ -93,8 +93,7 @@ class TaskState:
 
     def pose(self, name: str) -> Pose:
         """Return where an object is."""
-        if name not in self.poses:
-            raise unknown_name("scene object", name, self.poses)
+        check_known("scene object", (name,), self.poses)
         return self.poses[name]
 
     def object(self, name: str) -> SceneObject:

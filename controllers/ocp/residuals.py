@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.numerics.compiled import compiled
 from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.robot.model import RobotModel
@@ -65,8 +65,7 @@ class StageResiduals:
 
     def parameter_slice(self, name: str) -> slice:
         """Return where an objective's parameters lie."""
-        if name not in self._slices:
-            raise unknown_name("objective", name, self._slices)
+        check_known("objective", (name,), self._slices)
         return self._slices[name]
 
     def weights(self, mask: BoolArray) -> FloatArray:

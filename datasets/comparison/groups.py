@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.demonstration import Demonstration, Episode
 from handrail.datasets.reading.load import each_opened, some_recorded
@@ -99,8 +99,7 @@ def load_groups(
 
 def baseline_of(labels: Sequence[str], name: str) -> str:
     """Return the label that the others are compared with: the first when `name` is ""."""
-    if name and name not in labels:
-        raise unknown_name("baseline", name, labels)
+    check_known("baseline", filter(None, (name,)), labels)
     return name or labels[0]
 
 

@@ -11,7 +11,7 @@ from itertools import accumulate
 import numpy as np
 import pyarrow as pa
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.datasets.editing import config as verbs
 from handrail.datasets.editing.merge import Edited, copy_episodes
 from handrail.datasets.editing.source import EditSource, opened
@@ -63,8 +63,7 @@ def _slices(config: verbs.EditConfig, source: EditSource) -> Iterator[EpisodeSli
         return source.slices(chosen if isinstance(config, verbs.KeepConfig) else set(everything) - chosen)
     if isinstance(config, verbs.RenameConfig) and config.old_task:
         tasks = {task for row in source.rows for task in row["tasks"]}
-        if config.old_task not in tasks:
-            raise unknown_name("task", config.old_task, tasks)
+        check_known("task", (config.old_task,), tasks)
     touched = chosen if words else set(everything)
     return (
         _changed(config, source, each) if each.record.episode in touched else each for each in source.slices()

@@ -4,7 +4,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.errors import check_known
 from handrail.scripts import cli
 from handrail.scripts.bench.report import PROGRAM
 from handrail.scripts.commands import Verb
@@ -25,8 +25,7 @@ def main() -> None:
             sys.stdout.write(f"usage: {PROGRAM} NAME [OPTIONS]\n\n")
             sys.stdout.writelines(f"{name:14} {bench.help}\n" for name, bench in BENCHES.items())
             return 0
-        if name not in BENCHES:
-            raise unknown_name("bench", name, BENCHES)
+        check_known("bench", (name,), BENCHES)
         bench = BENCHES[name]
         return bench.run(cli.parse(bench.config, f"{PROGRAM} {name}", arguments))
 

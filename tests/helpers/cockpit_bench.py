@@ -13,6 +13,7 @@ from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.collect.config import RecordConfig
 from handrail.collect.operators.operator import EpisodeEvent, View
+from handrail.collect.operators.person.person import Person
 from handrail.collect.session.build import build_modes
 from handrail.controllers.interface.intent import Intent
 
@@ -37,7 +38,7 @@ class Bench:
         modes = build_modes(RecordConfig(task="reach"), env)
         self._env, self._server = env, ServerProcess(CockpitConfig(port=0, open=False))
         self.address, self.card = self._server.address, None
-        self.cockpit = Cockpit(env.model, modes, mode, self._server)
+        self.cockpit = Cockpit(Person(env.model, modes, mode), self._server)
         self.intent, self.events, self.seed = None, [], 0
         self._over, self._is_begun = threading.Event(), True
         self._thread = threading.Thread(target=self._run)

@@ -18,7 +18,7 @@ from handrail.collect.world.gl import graphics_trouble
 from handrail.collect.world.task import FixedTask, Start, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
@@ -62,8 +62,7 @@ class ShowcaseConfig:
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""
-        if self.case not in CASES:
-            raise unknown_name("case", self.case, CASES)
+        check_known("case", (self.case,), CASES)
         check_settings(self, "--")
         if self.folder.exists() and not self.folder.is_dir():
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
