@@ -30,15 +30,6 @@ POLICY_SUCCESS = Measure("policy_success", "success of policies", SHARE, "higher
 
 
 @dataclass(frozen=True)
-class Pair:
-    """Labels of a condition and of what it is compared with, and the family of comparisons."""
-
-    label: str
-    baseline: str
-    family: str = LIKE_FOR_LIKE
-
-
-@dataclass(frozen=True)
 class Outcomes:
     """How policies fared, and each condition against its baseline."""
 
@@ -52,7 +43,7 @@ class Outcomes:
         return {each.label: each for each in self.values if each.measure is POLICY_SUCCESS}
 
 
-def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
+def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Contrast]:
     """Return each condition of another group with that of the baseline's group it is compared with.
 
     That is the one that shares most of the words after the label and has none of its own: `ee intent same
@@ -75,12 +66,17 @@ def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str
                 f"{', '.join(conditions)}; name another --baseline"
             )
         other = max(fitting, key=lambda each: len(words[each]))
-        found.append(Pair(condition, other, LIKE_FOR_LIKE if words[other] == words[condition] else MIXED))
+        found.append(pair(condition, other, LIKE_FOR_LIKE if words[other] == words[condition] else MIXED))
     return found
 
 
+def pair(label: str, baseline: str, family: str = LIKE_FOR_LIKE) -> Contrast:
+    """Return the contrast of a condition and what it is compared with, before anything is known of it."""
+    return Contrast(measure=POLICY_SUCCESS, label=label, baseline=baseline, scope=POLICIES, family=family)
+
+
 def judge_pairs(
-    conditions: Mapping[str, Condition], pairs: Sequence[Pair], rng: np.random.Generator
+    conditions: Mapping[str, Condition], pairs: Sequence[Contrast], rng: np.random.Generator
 ) -> Outcomes:
     """Compare the success of conditions, each with a baseline of its own, family by family."""
     runs = {label: condition.runs() for label, condition in conditions.items()}
@@ -121,7 +117,7 @@ def _values(condition: Condition, resampled: FloatArray, rng: np.random.Generato
 
 
 def _difference(
-    pair: Pair, runs: Mapping[str, Sequence[Run]], resampled: Mapping[str, FloatArray]
+    pair: Contrast, runs: Mapping[str, Sequence[Run]], resampled: Mapping[str, FloatArray]
 ) -> Contrast:
     """Compare two conditions.
 
@@ -132,9 +128,8 @@ def _difference(
     handful of training seeds alone would see too much. Where a condition has one replicate there is neither.
     """
     both = runs[pair.label], runs[pair.baseline]
-    names = {"measure": POLICY_SUCCESS, "scope": POLICIES}
     estimate = float(replicates(both[0]).mean() - replicates(both[1]).mean())
-    found = replace(Contrast(**vars(pair), **names, **vars(compare_rollouts(*both))), estimate=estimate)
+    found = replace(pair, **vars(compare_rollouts(*both)) | {"estimate": estimate})
     if min(len(replicates(each)) for each in both) < 2:
         return replace(found, p=None, errors=(), reason=_ALONE)
     nested = resampled[pair.label] - resampled[pair.baseline]

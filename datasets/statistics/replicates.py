@@ -19,9 +19,13 @@ Chance = Callable[[Sequence[Run]], float]
 
 
 def chance_of_shares(runs: Sequence[Run]) -> float:
-    """Return the variance of one replicate's share if only its rollouts were drawn: p (1 − p) / R."""
+    """Return the variance of one replicate's share if only its rollouts were drawn.
+
+    p (1 − p) / R with p = (s + 2) / (n + 4) of s successes in n rollouts, R of a replicate.
+    """
     values = np.concatenate([run.values for run in runs])
-    return variance_of_share(values.sum(), len(values), len(values) / len(replicates(runs)))
+    share = (values.sum() + _SUCCESSES) / (len(values) + _TRIALS)
+    return float(share * (1.0 - share) / (len(values) / len(replicates(runs))))
 
 
 def chance_of_means(runs: Sequence[Run]) -> float:
@@ -118,15 +122,3 @@ def equivalence_power(margin: float, error: float, freedom: float) -> float:
     """
     beyond = margin / error - float(stats.t.ppf(1.0 - LEVEL, freedom))
     return max(0.0, 2.0 * float(stats.t.cdf(beyond, freedom)) - 1.0)
-
-
-def variance_of_share(successes: float, trials: int, each: float) -> float:
-    """Return the variance of a share of so many trials `each`, p (1 − p) / R, p = (s + 2) / (n + 4).
-
-    Args:
-        successes: s of all trials.
-        trials: n, all.
-        each: R, of one replicate.
-    """
-    share = (successes + _SUCCESSES) / (trials + _TRIALS)
-    return float(share * (1.0 - share) / each)

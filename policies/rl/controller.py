@@ -9,14 +9,7 @@ from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_t
 from handrail.controllers.baselines.twist_completion import TwistController
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
-from handrail.policies.rl.observation import (
-    ACTION_SIZE,
-    RigidPose,
-    TrackingSituation,
-    base_velocity,
-    check_robot,
-    observe,
-)
+from handrail.policies.rl.observation import ACTION_SIZE, RigidPose, base_velocity, check_robot, observe
 from handrail.policies.rl.policy import Actor
 
 _AHEAD = 5.0  # without a goal, where the present twist leads in this time is the goal [s]
@@ -60,16 +53,9 @@ class RlController(TwistController):
         current = pose.position, pose.rotation
         self._start = q[:3].copy() if self._start is None else self._start
         desired = self._desired or current
-        situation = TrackingSituation(
-            q=q,
-            start=self._start,
-            twist=clamp_twist(twist),
-            current=current,
-            desired=desired,
-            goal=self._goal or _moved(desired, twist, _AHEAD),
-            previous=self._action,
-        )
-        self._action = np.asarray(self._actor(observe(situation)), dtype=np.float64)
+        poses = current, desired, self._goal or _moved(desired, twist, _AHEAD)
+        observation = observe(q, self._start, clamp_twist(twist), poses, self._action)
+        self._action = np.asarray(self._actor(observation), dtype=np.float64)
         self._desired = _moved(desired, twist, duration)
         base = base_velocity(self._action, q[2])
         return self._arm.velocity(q, previous, base, clamp_twist(twist), duration)

@@ -1,6 +1,6 @@
 """Observation and action of the reinforcement-learning policy: 54 numbers in the base frame, a base twist."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,19 +17,6 @@ BASE_SPEED = np.array([0.4, 0.4, 0.75])  # of a full action: vx, vy [m/s], ωz [
 RigidPose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3)
 
 
-@dataclass(frozen=True)
-class TrackingSituation:
-    """The data of an observation; poses and twist in the world frame."""
-
-    q: FloatArray  # generalised coordinates, planar base first, (n,)
-    start: FloatArray  # base coordinates at the beginning of the episode, (3,)
-    twist: FloatArray  # commanded tool twist, world-aligned, (6,) [m/s, rad/s]
-    current: RigidPose  # pose of the tool
-    desired: RigidPose  # where the commands so far would have brought it
-    goal: RigidPose  # where they lead
-    previous: FloatArray  # action before, (3,)
-
-
 def check_robot(model: RobotModel) -> None:
     """Check that a robot is of the kind that the actor was trained on."""
     if not CONTROLLER.fits(model.description):
@@ -37,21 +24,28 @@ def check_robot(model: RobotModel) -> None:
         raise HandrailError(f"robot {model.description.name} of the learnt baseline: {words}")
 
 
-def observe(situation: TrackingSituation) -> FloatArray:
+def observe(
+    q: FloatArray, start: FloatArray, twist: FloatArray, poses: Sequence[RigidPose], previous: FloatArray
+) -> FloatArray:
     """Return the observation: twist 6, poses 3 × (3 + 9), base since the start 3, arm 6, previous action 3.
 
     Everything but the base coordinates is in the frame of the base, and these are relative to the base's
     first pose, so that an observation does not change when robot and goal are moved or turned together.
+
+    Args:
+        q: generalised coordinates, planar base first, (n,).
+        start: base coordinates at the beginning of the episode, (3,).
+        twist: commanded tool twist, world-aligned, (6,) [m/s, rad/s].
+        poses: of the tool in the world, three: now, where the commands so far would have brought it, and
+            where they lead.
+        previous: action before, (3,).
     """
-    angle = situation.q[2]
-    to_base = turned(np.eye(3), -angle)
-    origin = np.array([situation.q[0], situation.q[1], 0.0])
-    twist = situation.twist.reshape(2, 3) @ to_base.T
-    parts = [twist.ravel()]
-    for position, rotation in (situation.current, situation.desired, situation.goal):
+    to_base, origin = turned(np.eye(3), -q[2]), np.array([q[0], q[1], 0.0])
+    parts = [(twist.reshape(2, 3) @ to_base.T).ravel()]
+    for position, rotation in poses:
         parts += [to_base @ (position - origin), (to_base @ rotation).ravel()]
-    travelled = turned(np.eye(2), -situation.start[2]) @ (situation.q[:2] - situation.start[:2])
-    parts += [travelled, [angle - situation.start[2]], situation.q[3:], situation.previous]
+    travelled = turned(np.eye(2), -start[2]) @ (q[:2] - start[:2])
+    parts += [travelled, [q[2] - start[2]], q[3:], previous]
     return np.concatenate(parts)
 
 

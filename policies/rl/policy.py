@@ -2,7 +2,7 @@
 
 import io
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.regular_file import open_regular
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.rl.observation import ACTION_SIZE, OBSERVATION_SIZE
@@ -46,22 +46,6 @@ class Actor:
         return np.tanh(self.weights[-1] @ values + self.biases[-1])
 
     @classmethod
-    def from_state(cls, state: Mapping[str, FloatArray], conditioning: FloatArray) -> "Actor":
-        """Return the actor of a trained network.
-
-        Args:
-            state: of the actor of a Stable-Baselines3 policy, names as there.
-            conditioning: P, where the network was trained on P o; (54, 54).
-        """
-        names = sorted(
-            (name for name in state if name.startswith("latent_pi.") and name.endswith(".weight")),
-            key=lambda name: int(name.split(".")[1]),
-        )
-        layers = [name.removesuffix(".weight") for name in names] + ["mu"]
-        first, *others = (state[f"{layer}.weight"] for layer in layers)
-        return cls((first @ conditioning, *others), tuple(state[f"{layer}.bias"] for layer in layers))
-
-    @classmethod
     def mean(cls, actors: Sequence["Actor"]) -> "Actor":
         """Return the actor whose weights are the means of others' weights; they must have the same layers."""
         weights = zip(*(actor.weights for actor in actors), strict=True)
@@ -83,11 +67,9 @@ class Actor:
     def load(cls, path: Path | None = None) -> "Actor":
         """Read an actor from an .npz file; the one that comes with Handrail by default."""
         path = path or SHIPPED / "actor.npz"
-        try:
-            with open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:
-                layers = range(len(arrays.files) // 2)
-                weights = tuple(arrays[f"weight_{i}"] for i in layers)
-                biases = tuple(arrays[f"bias_{i}"] for i in layers)
-        except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
-            raise HandrailError(f"actor {path}: expected an .npz file, got {message_of(error)}") from error
+        what = f"actor {path}: expected an .npz file"  # NumPy and zipfile say in many ways that it is none
+        with restated(what), open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:
+            layers = range(len(arrays.files) // 2)
+            weights = tuple(arrays[f"weight_{i}"] for i in layers)
+            biases = tuple(arrays[f"bias_{i}"] for i in layers)
         return cls(weights, biases)

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from handrail.datasets.statistics.contrast import Contrast, adjusted
-from handrail.datasets.statistics.replicates import student
+from handrail.datasets.statistics.replicates import chance_of_shares, student
 from handrail.policies.study.declared import Parts, declared, of_pair, of_ways
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.results import MEASURES, Results, StudyCondition
@@ -96,7 +96,7 @@ def _contrast(
     if not draws:
         return None
     values = [sum(weight * each.share(draw, measure) for each, weight in conditions) for draw in draws]
-    least = sum(weight**2 * each.least(measure) for each, weight in conditions)
+    least = sum(weight**2 * chance_of_shares(each.runs(measure)) for each, weight in conditions)
     sides = _side(conditions, draws, measure, 1.0), _side(conditions, draws, measure, -1.0)
     return Contrast(
         measure=MEASURES[measure],

@@ -77,9 +77,10 @@ class StudyProgress:
         except HandrailError:
             return False
 
-    def note(self, job: StudyJob) -> dict[str, Any]:
-        """Return the note of a job: `settings`, `result`, what it `took`; nothing until it is done."""
-        return self._notes[job.name] if job.name in self.done else {}
+    @cached_property
+    def notes(self) -> dict[StudyJob, dict[str, Any]]:
+        """The note of every job that is done, in their order: `settings`, `result`, what it `took`."""
+        return {job: self._notes[job.name] for job in self.jobs if job.name in self.done}
 
     def rollouts(self, job: StudyJob) -> list[Path]:
         """Return the files of the rollouts of a job's policy; none until it is done."""

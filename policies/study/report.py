@@ -96,7 +96,7 @@ def _report(
 
 def _content(config: StudyConfig, results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     progress = results.progress
-    done = {job.name: note for job in progress.jobs if (note := progress.note(job))}
+    done = {job.name: note for job, note in progress.notes.items()}
     took = [note.get("took", {}) for note in done.values()]
     return {
         "format": _FORMAT,
@@ -174,15 +174,10 @@ def cautions(results: Results) -> dict[str, object]:
     """Return what stands in the way of reading the results as they are meant, and whether it does."""
     progress, design = results.progress, results.progress.design
     seen = [each["digest"] for each in designs(progress.layout)]
-    again = [
-        job.cell.name
-        for job in progress.jobs
-        if "digest_before" in progress.note(job).get("result", {}) and not job.policy
-    ]
+    notes = progress.notes
+    again = [job.cell.name for job, note in notes.items() if "digest_before" in note["result"]]
     missing, jobs = len(progress.missing), len(progress.jobs)
-    said = {
-        str(each) for job in progress.jobs if (each := progress.note(job).get("took", {}).get("versions"))
-    }
+    said = {str(each) for note in notes.values() if (each := note.get("took", {}).get("versions"))}
     return {
         _LIMITS: True,
         "One draw does not say how much another recording would differ.": design.draws < 2,

@@ -12,7 +12,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.evaluations import Condition, Policy, Rollout, read_evaluations
 from handrail.datasets.statistics.contrast import SHARE, Measure, Value
 from handrail.datasets.statistics.paired import wilson
-from handrail.datasets.statistics.replicates import student, variance_of_share
+from handrail.datasets.statistics.replicates import chance_of_shares, student
 from handrail.policies.study.jobs import StudyPolicy
 from handrail.policies.study.progress import StudyProgress
 
@@ -51,15 +51,10 @@ class StudyCondition(Condition):
         """Success of each draw's policy."""
         return {draw: self.share(draw) for draw in self.draws}
 
-    def least(self, measure: str = "success") -> float:
-        """Return the variance of a draw's share if only its rollouts were drawn anew."""
-        together = self.rolled(measure)
-        return variance_of_share(together.sum(), len(together), round(len(together) / len(self.policies)))
-
     @cached_property
     def value(self) -> Value:
         """Success: mean over draws, 95 % by Student's t; of a single draw Wilson's, for this very policy."""
-        found, rolled = student(list(self.shares.values()), self.least()), self.rolled()
+        found, rolled = student(list(self.shares.values()), chance_of_shares(self.runs())), self.rolled()
         low, high = found.interval or wilson(float(rolled.sum()), len(rolled))
         named: dict[str, Any] = vars(found) | {"interval": (max(0.0, low), min(1.0, high))}
         label, values = f"{self.label} {self.treatment}".strip(), np.array(list(self.shares.values()))
@@ -121,24 +116,18 @@ class Results:
             each for each in self.conditions.values() if (each.task, bool(each.treatment)) == (task, treated)
         ]
 
-    @property
-    def kinds(self) -> list[str]:
-        """The datasets: the modes; of rounds the common beginning, then round by round."""
-        return list(dict.fromkeys(job.cell.kind for job in self.progress.jobs))
-
-    def collected(self, task: str, kind: str) -> list[dict[str, Any]]:
-        """Return what was collected of a kind, draw by draw."""
-        return [
-            note["result"]
-            for job in self.progress.jobs
-            if job.policy is None and (job.cell.task, job.cell.kind) == (task, kind)
-            if (note := self.progress.note(job))
-        ]
+    def collected(self, task: str) -> dict[str, list[dict[str, Any]]]:
+        """Return what was collected, draw by draw, of each mode; of rounds each way, round by round."""
+        found = {job.cell.kind: [] for job in self.progress.jobs}
+        for job, note in self.progress.notes.items():
+            if job.policy is None and job.cell.task == task:
+                found[job.cell.kind].append(note["result"])
+        return {kind: each for kind, each in found.items() if each}
 
     def trained(self, condition: StudyCondition) -> list[dict[str, Any]]:
         """Return what came of the trainings of a condition's policies."""
-        jobs = [job for job in self.progress.jobs if job.policy in condition.learners]
-        return [note["result"] for job in jobs if (note := self.progress.note(job))]
+        notes = self.progress.notes.items()
+        return [note["result"] for job, note in notes if job.policy in condition.learners]
 
 
 def gather(progress: StudyProgress) -> Results:

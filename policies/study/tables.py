@@ -12,7 +12,7 @@ from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.contrast import Contrast
-from handrail.datasets.statistics.replicates import student
+from handrail.datasets.statistics.replicates import chance_of_shares, student
 from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM
 from handrail.policies.study.declared import declared
 from handrail.policies.study.power import detectable
@@ -92,16 +92,15 @@ def failures_table(task: str, results: Results) -> Table:
 def collection_table(task: str, results: Results) -> Table:
     """Return what was collected, all draws of a mode together."""
     headings = ("mode", "draws", "episodes", "success", "operator time", "s a success", "successes / h")
-    found = {kind: results.collected(task, kind) for kind in results.kinds}
-    rows = [(kind, *_collected(each)) for kind, each in found.items() if each]
+    rows = [(kind, *_collected(each)) for kind, each in results.collected(task).items()]
     return Table((*headings, "failures"), rows, "Collecting")
 
 
 def effort_table(task: str, results: Results) -> Table:
     """Return what helping a policy asks of the operator, all draws of a round together."""
     headings = ("round", "attention", "steering", "of the attention", "corrections / min", "contacts / min")
-    found = {kind: results.collected(task, kind) for kind in results.kinds}
-    rows = [(kind, *_effort(each)) for kind, each in found.items() if each and results.progress.design.rounds]
+    found = results.collected(task) if results.progress.design.rounds else {}
+    rows = [(kind, *_effort(each)) for kind, each in found.items()]
     return Table(headings, rows, "The operator's effort: attention is the time of whole attempts")
 
 
@@ -137,17 +136,16 @@ def quality_table(task: str, results: Results) -> Table:
 
     Those that one scale, or one controller, would have to be shared for are left to `handrail-compare`.
     """
-    modes = [kind for kind in results.kinds if results.collected(task, kind)]
-    found = [[each["quality"] for each in results.collected(task, mode)] for mode in modes]
+    found = results.collected(task)
     known = [metric for metric in METRICS if metric.needs not in ("scale", "controller")]
     rows, titles = [], {metric.name: metric.title for metric in known}
     for name in titles:
-        values = [[each.get(name) for each in draws] for draws in found]
+        values = [[each["quality"].get(name) for each in draws] for draws in found.values()]
         means = [[value for value in each if value is not None] for each in values]
         if any(means):
             shown = (number(float(np.mean(each))) if each else DASH for each in means)
             rows.append((titles[name], *shown))
-    return Table(("metric", *modes), rows, "The demonstrations: described, not tested")
+    return Table(("metric", *found), rows, "The demonstrations: described, not tested")
 
 
 def treatments_table(task: str, results: Results) -> Table:
@@ -162,7 +160,7 @@ def _treatment(each: StudyCondition, results: Results) -> tuple[str, ...]:
     whole, shown, before = results.find(each.task, each.label), [DASH] * 3, DASH
     if whole and (same := whole.beside(each)):
         apart = [each.share(draw) - same.share(draw) for draw in each.draws]
-        change = student(apart, each.least() + same.least())
+        change = student(apart, chance_of_shares(each.runs()) + chance_of_shares(same.runs()))
         difference = [wording.points(change.estimate), wording.points_span(change.interval)]
         shown = [percent(float(same.rolled().mean())), *difference]
         before = percent(float(same.rolled("contact").mean()))
@@ -173,8 +171,8 @@ def _treatment(each: StudyCondition, results: Results) -> tuple[str, ...]:
 def times_table(results: Results) -> Table:
     """Return what the jobs took."""
     took: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for job in results.progress.jobs:
-        if spent := results.progress.note(job).get("took"):
+    for job, note in results.progress.notes.items():
+        if spent := note.get("took"):
             kind = "train and evaluate" if job.policy else "collect"
             took.setdefault((job.cell.task, kind), []).append(spent)
     rows = [
@@ -193,10 +191,8 @@ def times_table(results: Results) -> Table:
 
 def cells_table(results: Results, name: str) -> Table:
     """Return the command that runs a cell anew, and the digest of its rows."""
-    notes = {job.cell.name: results.progress.note(job) for job in results.progress.jobs if not job.policy}
-    rows = [
-        (cell, note["result"]["digest"], cell_command(name, cell)) for cell, note in notes.items() if note
-    ]
+    notes = {job.cell.name: note for job, note in results.progress.notes.items() if not job.policy}
+    rows = [(cell, note["result"]["digest"], cell_command(name, cell)) for cell, note in notes.items()]
     return Table(("cell", "digest of the rows", "command"), rows, "Any cell again")
 
 

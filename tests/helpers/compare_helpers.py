@@ -8,7 +8,7 @@ from datasets_helpers import create, record_with_lerobot
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from handrail.datasets.comparison.evaluations import FORMAT, Condition, Policy
-from handrail.datasets.comparison.policies import Pair, judge_pairs
+from handrail.datasets.comparison.policies import judge_pairs, pair
 from handrail.datasets.format.schema import Feature
 
 JOINTS = [f"{name}.pos" for name in ("pan", "lift", "elbow", "flex", "roll", "gripper")]
@@ -105,7 +105,7 @@ def check_texts(figure) -> None:
 
 def judge(conditions, baseline, rng):
     """Compare the success of all conditions with the baseline's."""
-    return judge_pairs(conditions, [Pair(label, baseline) for label in conditions if label != baseline], rng)
+    return judge_pairs(conditions, [pair(label, baseline) for label in conditions if label != baseline], rng)
 
 
 def condition(label, runs, contacts=False):

@@ -15,7 +15,7 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from torch.utils.data import DataLoader
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import beside, explained, write_whole
@@ -169,15 +169,13 @@ class _Training:
             write_whole(self._draft, data.getvalue())
 
     def _load(self) -> None:
-        try:
+        with restated(f"{str(self._draft)!r}: say --overwrite"):  # of PyTorch, whatever the file holds
             content = torch.load(self._draft, self._config.device, weights_only=True)
             if content["settings"] != self._settings:
                 raise HandrailError("was begun with other settings")
             for part, state in zip(self._parts, content["parts"], strict=True):
                 part.load_state_dict(state)
             self._update, self._chunk = content["at"]
-        except Exception as error:  # of PyTorch: whatever the file holds, it is refused
-            raise HandrailError(f"{str(self._draft)!r}: {message_of(error)}; say --overwrite") from error
 
     @property
     def _parts(self) -> tuple[Any, ...]:
@@ -191,22 +189,16 @@ class _Training:
 
 
 def _chunks(config: EncoderConfig, first: int, end: int) -> Iterator[Samples]:
-    """Yield chunks in order, however many processes draw them."""
+    """Yield chunks in order, however many processes draw them: without a copy, as tensors."""
     around: dict[str, Any] = {"multiprocessing_context": "forkserver", "prefetch_factor": 2}
     loader = DataLoader(
         Drawn(config),  # pyright: ignore[reportArgumentType]
         batch_size=None,
         sampler=range(first, end),
         num_workers=config.workers,
-        collate_fn=_shared,  # pyright: ignore[reportArgumentType]
         **(around if config.workers else {}),
     )
     return ({name: each.numpy() for name, each in chunk.items()} for chunk in loader)
-
-
-def _shared(samples: Samples) -> dict[str, Tensor]:
-    """Return samples that go from one process to another without a copy."""
-    return {name: torch.from_numpy(each) for name, each in samples.items()}
 
 
 def _rate(update: int, updates: int) -> float:

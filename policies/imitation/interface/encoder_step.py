@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from lerobot.configs import PipelineFeatureType, PolicyFeature
-from lerobot.lerobot_types import EnvTransition, TransitionKey
-from lerobot.processor import ProcessorStep, ProcessorStepRegistry
+from lerobot.processor import IdentityProcessorStep, ObservationProcessorStep, ProcessorStepRegistry
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
@@ -21,24 +19,22 @@ from handrail.policies.imitation.interface.scene_memory import SceneMemory
 from handrail.policies.imitation.interface.trust import ENCODE
 
 _TIME = "observation.time"
-Features = dict[PipelineFeatureType, dict[str, PolicyFeature]]
 
 
-class OwnStep(ProcessorStep):
-    """A step of our own, a dataclass whose fields make it again."""
+class OwnStep(IdentityProcessorStep):
+    """A step of our own, a dataclass whose fields make it again.
+
+    Features stay as they are: LeRobot asks the steps of robots for theirs, never a policy's.
+    """
 
     def get_config(self) -> dict[str, Any]:
         """Return what makes this step again."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]
 
-    def transform_features(self, features: Features) -> Features:
-        """Return the features as they are: LeRobot asks the steps of robots for theirs, never a policy's."""
-        return features
-
 
 @ProcessorStepRegistry.register(ENCODE)
 @dataclass(eq=False)
-class PolicyEncoderStep(OwnStep):
+class PolicyEncoderStep(ObservationProcessorStep, OwnStep):
     """Reads from pictures where things are, as `observation.environment_state`, whatever is told of it."""
 
     reads: dict[str, Any]
@@ -49,10 +45,10 @@ class PolicyEncoderStep(OwnStep):
         self.encoder = Encoder(decoded(self.reads, Reads, f"step {ENCODE}"))
         self.reset()
 
-    def __call__(self, transition: EnvTransition) -> EnvTransition:
+    def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
         """Return the observation with what the pictures say."""
         reads, names = self.encoder.reads, self.encoder.reads.interface
-        shown = apart(transition, names)
+        shown = apart(observation, names)
         states, device = numbers_of(shown, STATE, len(names.state_names), ENCODE), shown[STATE].device
         pictures = {
             name: shown[key].detach().cpu().reshape(-1, *shown[key].shape[-3:])
@@ -66,7 +62,7 @@ class PolicyEncoderStep(OwnStep):
         rows = np.stack([memory.take(said, moment) for memory, moment in moments])
         around = torch.as_tensor(rows, device=device)
         shown[ENVIRONMENT] = around.reshape(*shown[STATE].shape[:-1], rows.shape[1])
-        return changed(transition, TransitionKey.OBSERVATION, shown)
+        return shown
 
     def _forget(self, times: object) -> None:
         """Forget where an episode begins: where the time is not later."""
@@ -90,23 +86,16 @@ class PolicyEncoderStep(OwnStep):
         self._times = np.zeros(0)
 
 
-def apart(transition: EnvTransition, interface: PolicyInterface) -> dict[str, Any]:
+def apart(observation: Mapping[str, Any], interface: PolicyInterface) -> dict[str, Any]:
     """Return an observation with robot and scene apart.
 
     A robot of LeRobot's, such as `handrail_sim`, shows them as one vector, `observation.state`.
     """
-    shown = dict(transition.get(TransitionKey.OBSERVATION) or {})
+    shown = dict(observation)
     sizes = [len(interface.state_names), len(interface.environment_names)]
     if ENVIRONMENT not in shown and size_of(shown.get(STATE)) == sum(sizes):
         shown[STATE], shown[ENVIRONMENT] = torch.split(shown[STATE], sizes, dim=-1)
     return shown
-
-
-def changed(transition: EnvTransition, key: TransitionKey, value: Any) -> EnvTransition:
-    """Return a transition with another observation or action."""
-    copied: Any = transition.copy()
-    copied[key] = value
-    return copied
 
 
 def encoder_step(encoder: Encoder) -> PolicyEncoderStep:

@@ -14,8 +14,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 import torch
-from lerobot.lerobot_types import EnvTransition, TransitionKey
-from lerobot.processor import ProcessorStepRegistry
+from lerobot.processor import ActionProcessorStep, ObservationProcessorStep, ProcessorStepRegistry
 from lerobot.processor.normalize_processor import NormalizerProcessorStep
 
 from handrail.collect.operators.modes import MODES
@@ -36,7 +35,6 @@ from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.encoder_step import (
     OwnStep,
     apart,
-    changed,
     encoder_step,
     numbers_of,
     shape_of,
@@ -132,7 +130,7 @@ class PolicyStep(OwnStep):
 
 
 @ProcessorStepRegistry.register(VIEW)
-class PolicyViewStep(PolicyStep):
+class PolicyViewStep(ObservationProcessorStep, PolicyStep):
     """Shows a policy what is recorded as it learnt to see it: relative poses, no velocities of its own."""
 
     raw: Mapping[str, Any]
@@ -146,9 +144,9 @@ class PolicyViewStep(PolicyStep):
         self.reset()
         _views[self.seen] = self
 
-    def __call__(self, transition: EnvTransition) -> EnvTransition:
+    def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
         """Return what the policy reads."""
-        shown, size = apart(transition, self.seen), len(self.seen.environment_names)
+        shown, size = apart(observation, self.seen), len(self.seen.environment_names)
         state = numbers_of(shown, STATE, len(self.seen.state_names), VIEW)
         around = numbers_of(shown, ENVIRONMENT, size, VIEW) if size else np.zeros((len(state), 0))
         device = shown[STATE].device
@@ -156,8 +154,8 @@ class PolicyViewStep(PolicyStep):
             shown.pop(key, None)
             if values.shape[1]:
                 shown[key] = torch.as_tensor(values, device=device)
-        self.raw, self.state = dict(transition.get(TransitionKey.OBSERVATION) or {}), state
-        return changed(transition, TransitionKey.OBSERVATION, shown)
+        self.raw, self.state = observation, state
+        return shown
 
     def reset(self) -> None:
         """Forget what was seen."""
@@ -165,7 +163,7 @@ class PolicyViewStep(PolicyStep):
 
 
 @ProcessorStepRegistry.register(ACT)
-class PolicyActionStep(PolicyStep):
+class PolicyActionStep(ActionProcessorStep, PolicyStep):
     """Turns what a policy writes, in the base's axes, into an action in those of the world.
 
     Joint velocities and the grippers; or the channels of a teleop mode, the focus (1 base) where it has two,
@@ -177,17 +175,17 @@ class PolicyActionStep(PolicyStep):
         super().__post_init__()
         self.view = _views.get(self.seen)
 
-    def __call__(self, transition: EnvTransition) -> EnvTransition:
+    def action(self, action: Any) -> torch.Tensor:
         """Return the action."""
         if self.view is None or self.view.state is None:
             raise self._error(f"expected the step {VIEW} to see something first, in the preprocessor")
-        action, size = transition.get(TransitionKey.ACTION), len(self.seen.action_names)
+        size = len(self.seen.action_names)
         if not isinstance(action, torch.Tensor) or size_of(action) != size:
             raise self._error(f"expected {size} numbers, got {getattr(action, 'shape', action)}")
         rows = action.detach().cpu().numpy().reshape(-1, size)
         states = np.broadcast_to(self.view.state, (len(rows), self.view.state.shape[1]))
         acted = torch.as_tensor(np.stack(self._acted(rows, states, self.view.raw)))
-        return changed(transition, TransitionKey.ACTION, acted.reshape(*action.shape[:-1], acted.shape[1]))
+        return acted.reshape(*action.shape[:-1], acted.shape[1])
 
     def _acted(self, rows: FloatArray, states: FloatArray, raw: Mapping[str, Any]) -> list[FloatArray]:
         """Return actions, of what a policy writes, (B, a), in some states, (B, s)."""

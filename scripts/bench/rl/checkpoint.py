@@ -5,8 +5,6 @@ never resume a run that a stranger has made. `start_from` reads tensors alone.
 """
 
 import io
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,13 +12,14 @@ from typing import Any
 from stable_baselines3 import SAC
 from stable_baselines3.common.save_util import load_from_zip_file
 
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import HandrailError, restated
 from handrail.controllers.typed import decoded
 from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.strict_json import load_json, write_json
 from handrail.scripts.bench.rl.config import TrainRlConfig
 
 _FILE = "checkpoint.zip"
+_NONE = "expected a checkpoint of this run"  # whatever zipfile, pickle and PyTorch find wrong with it
 
 
 class Learner(SAC):
@@ -45,7 +44,8 @@ class Learner(SAC):
 
     def start_from(self, folder: Path) -> None:
         """Take the actor and critics of a run's last checkpoint, not the optimisers' memory."""
-        with _checkpoint(folder, "--start_from") as path:
+        path = _checkpoint(folder, "--start_from")
+        with restated(f"{str(path)!r}: {_NONE}"):
             states: Any = load_from_zip_file(path, load_data=False, device="cpu")[1]
             self.policy.load_state_dict(states["policy"])
             self._require_finite()
@@ -58,11 +58,11 @@ class Learner(SAC):
             config: of the training.
             env: that it goes on in.
         """
-        with _checkpoint(config.folder, "--resume") as path:
-            settings = config.folder / "config.json"
-            content = load_json(settings, "settings of a training run")
-            config.check_continues(decoded(content, TrainRlConfig, repr(str(settings))))
-            changed = {"learning_rate": config.learning_rate, "tensorboard_log": config.tensorboard}
+        path, settings = _checkpoint(config.folder, "--resume"), config.folder / "config.json"
+        content = load_json(settings, "settings of a training run")
+        config.check_continues(decoded(content, TrainRlConfig, repr(str(settings))))
+        changed = {"learning_rate": config.learning_rate, "tensorboard_log": config.tensorboard}
+        with restated(f"{str(path)!r}: {_NONE}"):
             model = cls.load(path, env, device="cpu", **changed)
             model._require_finite()
             if (layers := model.policy_kwargs["net_arch"]) != list(config.layers):
@@ -84,17 +84,9 @@ def begin_run(config: TrainRlConfig) -> None:
     write_json(folder / "config.json", asdict(config))
 
 
-@contextmanager
-def _checkpoint(folder: Path, flag: str) -> Iterator[Path]:
-    """Provide the checkpoint of a run; whatever is wrong with it is one line."""
+def _checkpoint(folder: Path, flag: str) -> Path:
+    """Return the checkpoint of a run."""
     path = folder / _FILE
     if not path.is_file():
         raise HandrailError(f"{flag}: expected a run with a checkpoint in {folder}, found none")
-    try:
-        yield path
-    except HandrailError:
-        raise
-    except Exception as error:  # of zipfile, pickle and PyTorch: whatever the file holds, it is refused
-        raise HandrailError(
-            f"{str(path)!r}: expected a checkpoint of this run, got {message_of(error)}"
-        ) from error
+    return path

@@ -23,13 +23,7 @@ from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_t
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.controller import RlController
-from handrail.policies.rl.observation import (
-    ACTION_SIZE,
-    OBSERVATION_SIZE,
-    TrackingSituation,
-    base_velocity,
-    observe,
-)
+from handrail.policies.rl.observation import ACTION_SIZE, OBSERVATION_SIZE, base_velocity, observe
 from handrail.policies.rl.policy import Actor
 from handrail.scripts.bench.goal_reaching.config import BASELINES, BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.episode import Conditions, run_episode
@@ -137,17 +131,10 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self.q, self.velocity, self._pose = state.q, state.v, (tool.position, tool.rotation)
 
     def _observation(self) -> FloatArray:
-        goal = self.planner.goal
-        situation = TrackingSituation(
-            q=self.q,
-            start=self._start,
-            twist=clamp_twist(self.planner.twist(self.time)),
-            current=self._pose,
-            desired=self.planner.pose(self.time),
-            goal=(goal.position, goal.rotation),
-            previous=self._previous,
-        )
-        return np.clip(observe(situation), -_BOUND, _BOUND).astype(np.float32)
+        goal, twist = self.planner.goal, clamp_twist(self.planner.twist(self.time))
+        poses = self._pose, self.planner.pose(self.time), (goal.position, goal.rotation)
+        observation = observe(self.q, self._start, twist, poses, self._previous)
+        return np.clip(observation, -_BOUND, _BOUND).astype(np.float32)
 
 
 def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Pose, ...]:

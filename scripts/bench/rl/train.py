@@ -93,9 +93,11 @@ def _is_evaluated(model: Learner) -> bool:
 
 
 def actor_of(model: Learner) -> Actor:
-    """Return the actor of a model as plain arrays."""
-    state = {name: value.cpu().numpy() for name, value in model.actor.state_dict().items()}
-    return Actor.from_state(state, conditioning())
+    """Return the actor of a model as plain arrays; it sees o itself, where the networks see P o."""
+    layers = [each for each in (*model.actor.latent_pi, model.actor.mu) if isinstance(each, torch.nn.Linear)]
+    first, *others = (each.weight.numpy(force=True) for each in layers)
+    biases = tuple(each.bias.numpy(force=True) for each in layers)
+    return Actor((first @ conditioning(), *others), biases)
 
 
 class Watch(BaseCallback):

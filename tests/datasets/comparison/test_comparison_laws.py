@@ -11,7 +11,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.collection import collected, success_difference
 from handrail.datasets.comparison.episodes import differences
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.policies import LIKE_FOR_LIKE, MIXED, Pair, judge_pairs, pairs_between
+from handrail.datasets.comparison.policies import LIKE_FOR_LIKE, MIXED, judge_pairs, pair, pairs_between
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.episode_set import frames_of
@@ -156,7 +156,7 @@ def test_detectable_differences_are_detected_four_times_in_five(few_resamples, p
 def test_more_comparisons_see_less(few_resamples):
     generator = rng(10)
     conditions = {x: condition_of(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
-    (alone,) = judge_pairs(conditions, [Pair("a", "d")], generator).differences
+    (alone,) = judge_pairs(conditions, [pair("a", "d")], generator).differences
     family = adjusted([alone, *judge(conditions, "d", generator).differences])
     assert family[0].tests == 4
     assert family[0].seen > alone.seen
@@ -166,7 +166,7 @@ def test_more_comparisons_see_less(few_resamples):
 def test_every_family_is_corrected_for_itself(few_resamples):
     generator = rng(15)
     conditions = {x: condition_of(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
-    pairs = [Pair("a", "d"), Pair("b", "d", "mixed"), Pair("c", "d")]
+    pairs = [pair("a", "d"), pair("b", "d", "mixed"), pair("c", "d")]
     like, mixed, also = judge_pairs(conditions, pairs, generator).differences
     assert [each.family for each in (like, mixed, also)] == [LIKE_FOR_LIKE, "mixed", LIKE_FOR_LIKE]
     assert [each.tests for each in (like, mixed, also)] == [2, 1, 2]
@@ -217,10 +217,10 @@ def test_a_condition_is_compared_with_the_baseline_of_its_own_kind():
     labels = ["ee", "direct"]
     conditions = ["ee", "ee intent", "direct", "ee intent same number", "direct same number", "ee filter"]
     assert pairs_between(conditions, "direct", labels) == [
-        Pair("ee", "direct"),
-        Pair("ee intent", "direct", MIXED),
-        Pair("ee intent same number", "direct same number", MIXED),
-        Pair("ee filter", "direct", MIXED),
+        pair("ee", "direct"),
+        pair("ee intent", "direct", MIXED),
+        pair("ee intent same number", "direct same number", MIXED),
+        pair("ee filter", "direct", MIXED),
     ]
     assert pairs_between(["ee"], "direct", labels) == []
     with pytest.raises(

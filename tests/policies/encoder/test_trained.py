@@ -114,7 +114,7 @@ def test_an_encoder_learns_and_goes_on(tmp_path, capsys):
     state = torch.load(tmp_path / "e.training", weights_only=True)
     assert state["at"][0] == 6
     assert "goal" in capsys.readouterr().out
-    with pytest.raises(HandrailError, match="other settings; say --overwrite"):
+    with pytest.raises(HandrailError, match="say --overwrite: was begun with other settings"):
         train(config(tmp_path, lr=1e-4))
     assert Drawn(config(tmp_path)).reads == after.reads
 

@@ -160,12 +160,12 @@ def test_a_file_that_is_no_actor_is_refused(tmp_path, spoil):
 def test_plain_arrays_act_like_the_trained_network():
     """Law: the numpy forward pass is Stable-Baselines3's deterministic action."""
     sac = pytest.importorskip("stable_baselines3").SAC
-    from handrail.scripts.bench.rl.env import GoalReachingEnv
+    from handrail.scripts.bench.rl.train import actor_of
 
     env = GoalReachingEnv()
     P = conditioning()
     model = sac("MlpPolicy", env, policy_kwargs={"net_arch": [32, 16]}, buffer_size=10, seed=0, device="cpu")
-    actor = Actor.from_state({name: value.numpy() for name, value in model.actor.state_dict().items()}, P)
+    actor = actor_of(model)
     observation, _ = env.reset(seed=0)
     for _ in range(30):
         expected, _ = model.predict((P @ observation).astype(np.float32), deterministic=True)

@@ -15,11 +15,12 @@ from scipy import stats
 from handrail.datasets.presentation import wording
 from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.replicates import (
+    chance_of_shares,
     equivalence_p,
     equivalence_power,
     student,
-    variance_of_share,
 )
+from handrail.datasets.statistics.resampling import Run
 from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.study import tables
 from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, contrasts
@@ -202,7 +203,7 @@ def test_with_nothing_declared_or_with_one_draw_nothing_is_claimed(gathered):
 
 
 def test_a_share_of_few_is_never_certain():
-    assert variance_of_share(0, 50, 50) > 0.0
+    assert chance_of_shares([Run(0, 0, tuple(range(50)), np.zeros(50))]) > 0.0
     assert student([0.5], least=0.0).interval is None
     assert json.dumps(student([0.5, 0.7], least=0.0).estimate)
 
@@ -268,7 +269,7 @@ def test_metrics_without_a_common_scale_are_left_to_compare(gathered):
 def test_jobs_that_ran_under_other_versions_are_said(gathered):
     made = gathered().progress
     for job, version, said in zip(made.jobs, ("4.0.0", "4.0.0", "4.0.1"), (0, 0, 1), strict=False):
-        note = made.note(job)
+        note = made.notes[job]
         write_json(made.layout.done(job), note | {"took": note["took"] | {"versions": {"mujoco": version}}})
         results = gather(StudyProgress(made.design, made.layout))
         assert sum("other versions" in text for text, holds in cautions(results).items() if holds) == said
