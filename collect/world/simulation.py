@@ -110,6 +110,12 @@ class Simulation(Plant):
         self._held_at = -math.inf
         self._see()
 
+    def camera(self, name: str) -> tuple[Pose, float]:
+        """Return where a camera is, its axes right, up and back, and its vertical field of view [deg]."""
+        index = self.mujoco_model.camera(name).id
+        pose = _pose(self.data.cam_xpos[index], self.data.cam_xmat[index])
+        return pose, float(self.mujoco_model.cam_fovy[index])
+
     def _see(self) -> None:
         """Let bodies, cameras and lights be where the joints are."""
         mujoco.mj_kinematics(self.mujoco_model, self.data)
