@@ -29,13 +29,22 @@ def fitting[Spec: Any](specs: Mapping[str, Spec], hands: int) -> dict[str, Spec]
     return {name: spec for name, spec in importable(specs) if spec.hands <= hands}
 
 
-def importable[Spec: Any](specs: Mapping[str, Spec]) -> Iterator[tuple[str, Spec]]:
-    """Yield specs with their names; one that an installed package lacks is left out with a warning."""
+def importable[Spec: Any](
+    specs: Mapping[str, Spec], load: Callable[[Spec], object] = lambda spec: None
+) -> Iterator[tuple[str, Spec]]:
+    """Yield specs with their names; one that an installed package lacks is left out with a warning.
+
+    Args:
+        specs: by name.
+        load: imports what a spec needs besides; raises a `HandrailError` where that fails.
+    """
     for name in specs:
         try:
-            yield name, specs[name]
+            load(spec := specs[name])
         except HandrailError as error:
             logging.getLogger(__name__).warning("%s; it is left out", error)
+        else:
+            yield name, spec
 
 
 class Registry[Spec: Any](Mapping[str, Spec]):

@@ -21,11 +21,11 @@ from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.task import Task
 from handrail.collect.world.tasks.catalogue import TASKS, check_robot
 from handrail.controllers.baselines.catalogue import CONTROLLERS
-from handrail.controllers.errors import HandrailError, check_installed
+from handrail.controllers.errors import HandrailError, check_installed, restated
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
-from handrail.controllers.registry import fitting, resolved
+from handrail.controllers.registry import fitting, importable, resolved
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import frame_features
@@ -150,21 +150,24 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
 
 def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:
     """Return the modes that a person can change to, by name: all for the robot, and that of the settings."""
-    fit = fitting(MODES, len(env.model.description.hands)).values()
-    rest = (replace(config, mode=each.name, mask="") for each in fit if not _reason_against(each, env.model))
+    reason_against = partial(_reason_against, model=env.model)
+    fit = importable(fitting(MODES, len(env.model.description.hands)), reason_against)
+    rest = (replace(config, mode=name, mask="") for name, each in fit if not reason_against(each))
     return {mode.name: mode for mode in (build_mode(each, env.model) for each in (config, *rest))}
 
 
 def _reason_against(mode: TeleopMode, model: RobotModel) -> str:
-    """Return why a robot cannot be driven in a mode; "" if it can."""
+    """Return why a robot cannot be driven in a mode; "" if it can. Imports the mode's controller."""
     if not mode.available:
         return f"expected the package {mode.module}, found none; install it"
     robot, channels, hand = model.description, Channels.of(model.description), model.hand.name
     owned = dict.fromkeys((*mode.owned("hand", hand), *mode.owned("base", hand)))
     if missing := ", ".join(group for group in owned if not channels.have(group)):
         return f"expected a robot with channels {missing}, got {robot.name}"
-    fits = CONTROLLERS.find(mode.controller).fits(robot)
-    return "" if fits else f"its controller cannot drive {robot.name}"
+    with restated(f"mode {mode.name}", HandrailError):
+        controller = CONTROLLERS.find(mode.controller)
+        resolved(controller.build)
+    return "" if controller.fits(robot) else f"its controller cannot drive {robot.name}"
 
 
 def session_features(env: HandrailEnv, shared: bool = False) -> dict[str, Feature]:

@@ -3,12 +3,16 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from datasets_helpers import record
 
-from handrail.collect.operators.modes import MODES
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES, TeleopMode, always
+from handrail.collect.session.build import build_env, build_modes
+from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import fitting
 from handrail.datasets.quality.measure import measure
@@ -43,6 +47,34 @@ def test_a_broken_mode_is_not_offered(broken, monkeypatch, caplog):
     assert "wand" in MODES
     assert list(fitting(MODES, 1)) == before
     assert caplog.messages == ["mode wand: cannot import it: No module named 'no_such_kit'; it is left out"]
+
+
+WHOLE = ControllerSpec("whole", lambda model, period: None, "a controller that is there")
+PART = ControllerSpec("part", "no_such_kit:PART", "a controller whose class is missing")
+OF_PART = TeleopMode("of_part", always("hand"), f"{__name__}:PART", "its controller's class is missing")
+OF_WHOLE = TeleopMode("of_whole", always("hand"), f"{__name__}:WHOLE", "all is there")
+OF_NONE = TeleopMode("of_none", always("hand"), "no_such_kit:NONE", "its controller is missing")
+
+
+def test_a_mode_without_its_controller_is_left_out_unless_it_is_the_chosen_one(tmp_path, monkeypatch, caplog):
+    info = tmp_path / "half_kit-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: half-kit\nVersion: 1.0\n")
+    names = ("of_part", "of_whole", "of_none")
+    lines = (f"{name} = {__name__}:{name.upper()}\n" for name in names)
+    (info / "entry_points.txt").write_text("[handrail.modes]\n" + "".join(lines))
+    monkeypatch.syspath_prepend(tmp_path)
+    config = SessionConfig(task="reach", physics=False)
+    env = build_env(config, 20)
+    offered = build_modes(config, env)
+    assert [name for name in names if name in offered] == ["of_whole"]
+    missing = "cannot import it: No module named 'no_such_kit'"
+    assert [line for line in caplog.messages if "no_such_kit" in line] == [
+        f"mode of_part: no_such_kit:PART: {missing}; it is left out",
+        f"mode of_none: controller no_such_kit:NONE: {missing}; it is left out",
+    ]
+    with pytest.raises(HandrailError, match=r"^mode of_none: controller no_such_kit:NONE: cannot import it"):
+        build_modes(replace(config, mode="of_none"), env)
 
 
 @pytest.mark.parametrize(
