@@ -50,6 +50,8 @@ def importable[Spec: Any](
 class Registry[Spec: Any](Mapping[str, Spec]):
     """Specs by name: what comes with Handrail, then what installed packages add by entry points.
 
+    So the places of Handrail's own do not depend on what is installed.
+
     Their group is `handrail.<thing>s`; they are imported when they are asked for. The names in this mapping
     are safe, whoever says them. `find` also imports `module:name`: ask it for names that the command line or
     a program says, and for those of a file once `admit` let them pass.
@@ -116,7 +118,8 @@ class Registry[Spec: Any](Mapping[str, Spec]):
 
     def _installed(self) -> dict[str, str]:
         entries = _entry_points(tuple(sys.path)).select(group=f"handrail.{self._thing}s")
-        return {entry.name: entry.value for entry in entries}
+        own_first = sorted(entries, key=lambda entry: not entry.value.startswith("handrail."))
+        return {entry.name: entry.value for entry in own_first}
 
     def _spec(self, name: str, reference: str) -> Spec:
         spec = resolved(reference, f"{self._thing} {name}")

@@ -39,8 +39,9 @@ def choice_of(action: str, person: Person) -> Ask | None:
             step = _STEP if action == "faster" else -_STEP
             return Ask("speed", round(min(1.0, max(_LEAST, now + step)), 1))
         case "frame":
-            at = FRAMES.index(setting.frame) if setting.frame in FRAMES else -1
-            return Ask("frame", FRAMES[(at + 1) % len(FRAMES)])
+            frames = [frame for frame in FRAMES if frame in person.frames]
+            at = frames.index(setting.frame) if setting.frame in frames else -1
+            return Ask("frame", frames[(at + 1) % len(frames)])
         case "focus":
             focus = "hand" if setting.focus == "base" else "base"
             return Ask("focus", focus) if setting.mode.by_focus else None

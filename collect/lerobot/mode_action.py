@@ -48,6 +48,12 @@ class ModeAction:
         self._own = (*(channels.names[i] for i in self._owned), *focus, *self._grippers)
         self.names = tuple(map(lerobot_name, self._own))
 
+    @property
+    def turns(self) -> bool:
+        """Whether a twist can be turned: of each translation and rotation, the mode has all axes or none."""
+        masks = (mask[part].reshape(2, 3) for mask in (self._hand, self._base) for part in self._twists)
+        return all(np.array_equal(mask.any(axis=1), mask.all(axis=1)) for mask in masks)
+
     def intent(self, numbers: ArrayLike, time: float) -> Intent:
         """Return what numbers in the order of `names` ask for; one that is not finite brakes.
 
@@ -81,9 +87,17 @@ class ModeAction:
             intent: what an operator asks for.
             rotations: of the tools, (3, 3) each, for an intent that is meant in their axes; a pair's is in
                 those of the first.
+
+        Raises:
+            HandrailError: It is meant in the tool's axes, of which the mode has only some.
         """
         values = np.where(intent.mask, intent.values, 0.0)
         if intent.frames.tool == "tool":
+            if not self.turns:
+                raise HandrailError(
+                    f"action of mode {self._mode.name}: expected a twist along the world's axes, "
+                    "got one in the tool's, of which the mode has only some"
+                )
             for part, rotation in zip(self._twists, (*rotations, rotations[0]), strict=False):
                 values[part] = (values[part].reshape(2, 3) @ rotation.T).ravel()
         focus = (np.array_equal(intent.mask, self._base),) if self._mode.by_focus else ()

@@ -5,6 +5,7 @@ button: after success, failure or throwing it away comes another scene, after be
 While they do not steer, the robot brakes and time stands still. LeRobot's own keys save and repeat episodes.
 """
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
 from typing import Any
@@ -16,6 +17,7 @@ from handrail.collect.devices.open_devices import open_device
 from handrail.collect.lerobot.configs import HandrailCockpitConfig, HandrailGamepadConfig
 from handrail.collect.lerobot.sim import HandrailSim
 from handrail.collect.lerobot.teleoperator import SimTeleoperator
+from handrail.collect.operators.person.meaning import HAND_FRAMES
 from handrail.collect.operators.person.person import Person
 from handrail.controllers.errors import check_installed
 from handrail.datasets.presentation.terminal import Terminal
@@ -40,6 +42,7 @@ class HandrailCockpit(SimTeleoperator):
         mode, say = robot.mode, Terminal().print
         self._server = open_server(self._settings, say)
         person = Person(robot.env.model, {mode.name: mode}, mode.name)
+        _keep_to_sayable_frames(person, robot, say)
         return Cockpit(person, self._server, _REFUSED, say)
 
 
@@ -55,4 +58,13 @@ class HandrailGamepad(SimTeleoperator):
         config = replace(RecordConfig(**said, teleop=self._settings), operator="gamepad")
         owned = partial(robot.mode.owned, hand=robot.env.model.hand.name)
         mode = replace(robot.mode, groups=owned)  # whichever hand is chosen, its action is of this one
-        return open_device(config, robot.env, print, {mode.name: mode}, with_keys=False)  # LeRobot reads them
+        made = open_device(config, robot.env, print, {mode.name: mode}, with_keys=False)  # LeRobot reads them
+        _keep_to_sayable_frames(made.person, robot, print)
+        return made
+
+
+def _keep_to_sayable_frames(person: Person, robot: HandrailSim, say: Callable[[str], None]) -> None:
+    """Leave the tool's frame out, and say so, where an action cannot say a twist in its axes."""
+    if not robot.action.turns:
+        person.frames = tuple(frame for frame in HAND_FRAMES if frame != "tool")
+        say(f"mode {robot.mode.name} has only some of a hand's axes: it is not steered in the tool's frame")

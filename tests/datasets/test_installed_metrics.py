@@ -49,6 +49,14 @@ def test_a_broken_mode_is_not_offered(broken, monkeypatch, caplog):
     assert caplog.messages == ["mode wand: cannot import it: No module named 'no_such_kit'; it is left out"]
 
 
+def test_a_package_changes_no_place_of_handrail_s_own_modes(broken, monkeypatch):
+    """LeRobot's robot observes a mode as its place."""
+    before = list(MODES)
+    assert before[-1] == "rl"  # which is an entry point, as a package's modes are
+    monkeypatch.syspath_prepend(broken)
+    assert list(MODES) == [*before, "wand"]
+
+
 WHOLE = ControllerSpec("whole", lambda model, period: None, "a controller that is there")
 PART = ControllerSpec("part", "no_such_kit:PART", "a controller whose class is missing")
 OF_PART = TeleopMode("of_part", always("hand"), f"{__name__}:PART", "its controller's class is missing")

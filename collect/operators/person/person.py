@@ -50,6 +50,7 @@ class Person:
             what was lost is paused, and goes on with Start alone.
 
     Attributes:
+        frames: in which the hand may be steered.
         setting: what the operator has chosen.
         phase: where the episode stands.
         practises: whether the episode is not to be saved.
@@ -70,6 +71,7 @@ class Person:
         self._lost = Phase.PAUSED if supervises else Phase.LOST
         self.meaning = InputMeaning(model)
         self.modes, self._clock = modes, clock
+        self.frames = HAND_FRAMES
         self.setting, self.phase = Setting(modes[first], hand=model.hand.name), Phase.READY
         self.inputs: Input | None = None
         self.received = self.round_trip = 0.0
@@ -142,7 +144,7 @@ class Person:
                 self.setting = setting.switched(focus=value)
             case "hand" if value in self.meaning.hands and value != setting.hand:
                 self.setting = setting.switched(hand=value)
-            case "frame" if value in HAND_FRAMES:
+            case "frame" if value in self.frames:
                 self.setting = replace(setting, frame=value)
             case "speed":
                 self.setting = replace(setting, speed=max(value, 0.05))

@@ -3,11 +3,13 @@
 import json
 import time
 from itertools import count
+from types import SimpleNamespace
 
 import pytest
 from cockpit_helpers import drive, page, told
 
 from handrail.collect.devices import open_devices
+from handrail.collect.devices.local_person import choice_of
 from handrail.collect.lerobot import (
     HandrailCockpit,
     HandrailCockpitConfig,
@@ -95,9 +97,24 @@ def test_a_person_with_a_gamepad_drives(robot, pad, tmp_path):
 def test_lerobot_s_keys_are_lerobot_s_alone(robot, monkeypatch, tmp_path):
     """Two readers of one terminal get each key by chance."""
     monkeypatch.setattr(open_devices, "has_terminal", lambda: True)
-    monkeypatch.setattr(open_devices, "_person", lambda *given: given)
-    *_, beside = HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))._made(robot)
-    assert beside is None
+    monkeypatch.setattr(
+        open_devices, "_person", lambda *given: SimpleNamespace(person=None, beside=given[-1])
+    )
+    assert HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))._made(robot).beside is None
+
+
+@pytest.mark.parametrize(("task", "more"), [("reach", ["tool"]), ("tray", [])])
+def test_nobody_chooses_a_frame_that_an_action_cannot_say(task, more, pad, tmp_path, capsys):
+    """In `tray` the mode `ee` has some of the hand's axes: no action says these in the tool's."""
+    robot = HandrailSim(HandrailSimConfig(task=task, calibration_dir=tmp_path))
+    made = HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))._made(robot)
+    chosen = set()
+    for _ in range(4):
+        made.person.ask(choice_of("frame", made.person))
+        chosen.add(made.person.setting.frame)
+    made.close()
+    assert chosen == {"base", "world", *more}
+    assert ("not steered in the tool's frame" in capsys.readouterr().out) is (not more)
 
 
 def test_a_gamepad_steers_the_hand_of_the_action_whichever_is_chosen(pad, tmp_path):

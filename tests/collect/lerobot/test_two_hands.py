@@ -1,5 +1,7 @@
 """LeRobot's plugins with two hands: names by one rule, and the hand that is told does the task."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -12,7 +14,8 @@ from handrail.collect.lerobot import (
     HandrailSimConfig,
 )
 from handrail.collect.lerobot.mode_action import ModeAction
-from handrail.collect.operators.modes import MODES
+from handrail.collect.operators.modes import MODES, TeleopMode, always
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
@@ -75,3 +78,23 @@ def test_a_twist_in_a_tool_s_axes_is_turned_by_that_hand_s_own():
         twists = values[mask][: 6 * len(hands)].reshape(-1, 2, 3)
         turned = np.ravel([twist @ turns[hand].T for hand, twist in zip(hands, twists, strict=True)])
         np.testing.assert_allclose(np.array(said, dtype=float), np.append(turned, [0.0, 1.0]))
+
+
+@pytest.mark.parametrize(
+    ("mode", "turns"), [("ee", True), ("switching", True), ("pair", True), ("base", True)]
+)
+def test_a_mode_with_whole_twists_can_say_them_in_a_tool_s_axes(mode, turns):
+    assert ModeAction(MODES[mode], CHANNELS).turns is turns
+
+
+@pytest.mark.parametrize("group", ["hand", "pair"])
+def test_a_mode_with_some_axes_refuses_the_tool_s(group):
+    """Law: the wish along an axis of the tool is kept or refused; a part of it is no answer."""
+    mode = TeleopMode("some", always(group), "mpc", "some axes").leaving(("ee.wx",), ())
+    action, mask = ModeAction(mode, CHANNELS, "left"), CHANNELS.mask(*mode.owned("hand", "left"))
+    intent = Intent(np.ones(CHANNELS.size), mask, (0.0, 0.0), frames=Frames(tool="tool"))
+    assert not action.turns
+    with pytest.raises(HandrailError, match=r"^action of mode some: .* axes"):
+        action.action(intent, [np.eye(3)] * 2)
+    said = action.action(replace(intent, frames=Frames()), [np.eye(3)] * 2)
+    assert sum(said.values()) == mask.sum()
