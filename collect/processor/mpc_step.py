@@ -122,8 +122,8 @@ class MaskedMpcStep(RobotActionProcessorStep):
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past; the base is at `start` with the next observation."""
-        self._body.reset(self.start)
+        """Forget the past; the base is at `start` with the next observation, as fast as that says."""
+        self._body.reset(self.start, rests=False)
         self._intent.reset()
         self._mpc.reset(self._around)
         self._braking, self._before = "", math.inf

@@ -75,12 +75,14 @@ class WholeBody:
         self._grip_steps = period * np.array(strokes)
         self.reset()
 
-    def reset(self, base: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+    def reset(self, base: ArrayLike = (0.0, 0.0, 0.0), rests: bool = True) -> None:
         """Begin anew with the next observation.
 
         Args:
             base: where the base is taken to be then, (3,) [m, rad].
+            rests: whether the base is taken to rest then; else its measured velocity counts as sent.
         """
+        self._rests = rests
         self._gate = Gate(self._model, self._period, precision=np.float64)
         self._base = np.array(base, dtype=np.float64)
         self._reading: BodyReading | None = None
@@ -197,6 +199,10 @@ class WholeBody:
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)
         if reading.pose is not None:
             self._base = reading.pose
+        if before is None and not self._rests:
+            fastest = self._model.description.limits.velocity[: self._b]
+            twist = turned(reading.twist, self._base[2])[: self._b]
+            self._gate.velocity[: self._b] = np.clip(twist, -fastest, fastest)
         if before is not None:
             change = self._base - base
             change[2] = math.remainder(change[2], 2.0 * math.pi)  # a heading may begin anew at ±π

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from processor_helpers import Drive
+from processor_helpers import PERIOD, Drive
 
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
@@ -58,3 +58,29 @@ def test_in_a_slow_loop_no_joint_is_sent_past_its_range():
     drive.go({f"joint.{joint}": 1.5}, 4.0, 1.0 / 15.0)
     past = drive.robot.arm[0] - DESCRIPTION.limits.position_upper[3]
     assert -0.05 < past < 0.002
+
+
+@pytest.mark.parametrize("start", [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]])
+def test_after_a_reset_in_motion_the_base_goes_on_within_its_limits(start):
+    drive = Drive(start=start)
+    limits, twist = drive.model.description.limits, {"base.vx": 0.4, "base.vy": 0.1, "base.wz": 0.3}
+    drive.robot.pose = np.array(start)
+    drive.go(twist, 2.0)
+    drive.robot.pose = np.array(start)
+    drive.pipeline.reset()
+    for wanted in (twist, {"base.vx": 0.0, "base.vy": 0.0, "base.wz": 0.0}):
+        for _ in range(5):
+            before = drive.robot.twist
+            drive.go(wanted)
+            change = np.abs(drive.robot.twist - before)
+            assert (change <= PERIOD * limits.acceleration[:3] + 0.02).all()  # the frame turns, too
+            if wanted is twist:
+                np.testing.assert_allclose(drive.robot.twist, [0.4, 0.1, 0.3], atol=0.05)
+
+
+def test_a_base_that_is_too_fast_at_a_reset_counts_as_its_limit():
+    drive = Drive()
+    fastest = drive.model.description.limits.velocity[0]
+    drive.robot.twist = np.array([2.0 * fastest, 0.0, 0.0])
+    drive.go({"base.vx": fastest, "base.vy": 0.0, "base.wz": 0.0})
+    assert 0.8 * fastest < drive.robot.twist[0] <= fastest + 1e-9
