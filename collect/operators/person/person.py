@@ -71,7 +71,7 @@ class Person:
         self._lost = Phase.PAUSED if supervises else Phase.LOST
         self.meaning = InputMeaning(model)
         self.modes, self._clock = modes, clock
-        self.frames = HAND_FRAMES
+        self.frames: tuple[str, ...] = HAND_FRAMES
         self.setting, self.phase = Setting(modes[first], hand=model.hand.name), Phase.READY
         self.inputs: Input | None = None
         self.received = self.round_trip = 0.0

@@ -1,6 +1,8 @@
 """A trained policy, as an operator."""
 
+from bisect import bisect_left
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -67,7 +69,7 @@ class PolicyOperator:
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
         if self._policy.encoder:
-            self._memory = SceneMemory(self._policy.encoder.reads)
+            self._memories = [(-np.inf, SceneMemory(self._policy.encoder.reads))]
         self.malformed = 0
         self.replan()
 
@@ -84,7 +86,9 @@ class PolicyOperator:
         state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
         if encoder := self._policy.encoder:
             said = encoder.look({name: each[None] for name, each in pictures.items()}, state[None])
-            around = self._memory.take(said, 0)
+            memory = self._before(view.state.time)
+            around = memory.take(said, 0)
+            self._memories.append((view.state.time, memory))
         if self._period and view.state.time > self._asked + 1.5 * self._period:
             self._policy.skip(round((view.state.time - self._asked) / self._period) - 1)
         self._asked, self._state = view.state.time, state
@@ -93,6 +97,13 @@ class PolicyOperator:
         self.malformed += not self._fits(action)
         self._said = replace(self._read(action, state), mode=self._mode, time=view.state.time)
         return self._said
+
+    def _before(self, time: float) -> SceneMemory:
+        """Return a memory of what was seen; after an undo, of what was seen before a time [s]."""
+        known = self._memories
+        if time < known[-1][0]:
+            del known[bisect_left(known, time, key=itemgetter(0)) :]
+        return known[-1][1].copy()
 
     def chunk(self) -> list[Intent]:
         """Return what is planned for the periods after the last intent, as meant where the robot was then."""

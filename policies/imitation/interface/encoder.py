@@ -75,8 +75,8 @@ class Reads:
 class Said:
     """A camera's estimates of one object at T moments, in the world's axes."""
 
-    tool: FloatArray
-    """Where the tool is, (T, 3) [m]."""
+    tools: FloatArray
+    """Where the hands' tools are, (T, h, 3) [m]."""
     position: FloatArray
     """(T, 3) [m]."""
     spread: FloatArray
@@ -192,11 +192,13 @@ class Encoder:
             numbers: of `read`.
             states: of the robot, as recorded, (T, s).
         """
-        pose, found = self.reads.interface.pose(states), {name: [] for name, _, _ in self.reads.objects}
+        names, found = self.reads.interface, {name: [] for name, _, _ in self.reads.objects}
+        poses = [names.pose(states, hand) for hand in range(len(names.tools))]
+        tools = np.stack([pose.tool for pose in poses], axis=1)
         for camera, said in zip(
             self.reads.cameras.values(), np.moveaxis(numbers.astype(float), 1, 0), strict=True
         ):
-            place, turn = camera.view(pose)
+            place, turn = camera.view(poses[0])
             slope = torch.full((len(said),), camera.slope, dtype=torch.float64)
             parts = np.split(said, np.cumsum(self.reads.sizes)[:-1], axis=1)
             for (name, _, _), each in zip(self.reads.objects, parts, strict=True):
@@ -204,7 +206,7 @@ class Encoder:
                 way, rays = (np.einsum("tij,tj->ti", turn, of) for of in (d, ray))
                 m, r = each[:, PLACED:-1], each[:, -1]
                 turned = (turn @ facing(ray) @ orthonormal(m), widths(r)) if m.size else ()
-                found[name].append(Said(pose.tool, place + way, spread(rays, width), *turned))
+                found[name].append(Said(tools, place + way, spread(rays, width), *turned))
         return found
 
 

@@ -10,6 +10,7 @@ count.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,7 +19,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.policies.imitation.interface.encoder import Reads, Said, same
 
 _STANDS, _MOVES = (0.0005, 0.002), (0.02, 0.10)  # √q, a frame: of the place [m], of the turn
-_REACH = 0.2  # from the tool, beside how far off that is [m]
+_REACH = 0.2  # from a tool, beside how far off that is [m]
 _FAR = 4.0  # standard deviations
 _DOUBT = 1.2  # by which P grows where what is said is farther
 _TURN = 0.5  # of the determinant of a rotation, which is 1: less is none
@@ -37,6 +38,12 @@ class SceneMemory:
         self._known = {
             name: _Known(reads.turns.get(name, 1), name in reads.movable) for name, _, _ in reads.objects
         }
+
+    def copy(self) -> "SceneMemory":
+        """Return one that knows the same, and learns by itself."""
+        twin = copy(self)
+        twin._known = {name: copy(each) for name, each in self._known.items()}
+        return twin
 
     def take(self, said: Mapping[str, Sequence[Said]], moment: int) -> FloatArray:
         """Take what is said at a moment, and return the environment's state as it is known, (e,) float32."""
@@ -65,7 +72,7 @@ class _Known:
         """Take what the cameras say at a moment; return position, (3,), or with its quaternion, (7,)."""
         alike = _ALIKE
         if self._spread is not None:
-            away = float(np.linalg.norm(self._place - said[0].tool[moment]))
+            away = min(float(np.linalg.norm(self._place - tool)) for tool in said[0].tools[moment])
             moves = self._movable and away < _REACH + np.sqrt(np.trace(self._spread))
             drift, turn_drift = _MOVES if moves else _STANDS
             alike = 1.0 if moves else _ALIKE

@@ -115,8 +115,8 @@ def said(place, off=0.1, turn=None, turned_off=0.1, away=0.1):
     """Return what a camera says that is as far off in every direction."""
     rotation = None if turn is None else np.asarray(turn)[None]
     place, turned_off = np.array([place], float), np.array([turned_off], float)
-    tool = place + [[away, 0.0, 0.0]]
-    return [Said(tool, place, off**2 * np.eye(3)[None], rotation, turned_off)]
+    tools = (place + [[away, 0.0, 0.0]])[:, None]
+    return [Said(tools, place, off**2 * np.eye(3)[None], rotation, turned_off)]
 
 
 def remembered(memory, of_cube):
@@ -292,7 +292,7 @@ def test_a_place_in_two_pictures_is_a_place_in_space():
         again = in_picture(torch.from_numpy(d), torch.tensor([mount.slope], dtype=torch.float64), SIZE)
         np.testing.assert_allclose(again[0], [u, v], atol=1e-6)
         off = spread(ray @ turn.T, width)
-        seen.append(Said(pose.tool, place + d @ turn.T, off, np.eye(3)[None], np.ones(1)))
+        seen.append(Said(pose.tool[:, None], place + d @ turn.T, off, np.eye(3)[None], np.ones(1)))
     others = {name: said([0.0, 0.0, 0.0]) for name in ("bin", "cube_table", "bin_table")}
     memory = SceneMemory(reads())
     for _ in range(5):

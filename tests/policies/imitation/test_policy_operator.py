@@ -1,4 +1,4 @@
-"""A trained policy beside a person: one bad row of its plan brakes; its plan waits for the robot."""
+"""A trained policy beside a person: a bad row brakes, its plan waits for the robot, an undo is one."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +13,8 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import LONG_AGO, Intent
 from handrail.controllers.interface.sources import POLICY
 from handrail.policies.imitation.evaluation.policy_operator import PolicyOperator
+from handrail.policies.imitation.interface.encoder import Said
+from handrail.policies.imitation.interface.scene_memory import SceneMemory
 
 DRIVES = asks("base", "ee", value=0.1)
 ROWS = np.full((8, 7), 0.1)
@@ -86,3 +88,49 @@ def test_while_the_robot_is_not_heard_the_plan_stands_still():
     assert policy.asked == 3
     times = [each.source(POLICY).predict.times[0] for each in found]
     assert times == pytest.approx([0.05, 0.1, 0.1, 0.1, 0.15])
+
+
+class Looks:
+    """An encoder that says where one thing is."""
+
+    def __init__(self):
+        self.x = 1.0
+        self.reads = SimpleNamespace(
+            objects=[("cube", ("x", "y", "z"), 0)],
+            turns={},
+            movable=("cube",),
+            interface=SimpleNamespace(environment_names=("cube.x", "cube.y", "cube.z")),
+        )
+
+    def look(self, pictures, states, hands=(1.0,)):
+        tools = np.array(hands)[None, :, None] * [1.0, 0.0, 0.0]
+        return {"cube": [Said(tools, np.array([[self.x, 0.0, 0.0]]), 0.01 * np.eye(3)[None])]}
+
+
+def test_after_an_undo_what_was_seen_since_is_forgotten():
+    """Law: the policy sees what it would have seen without, bit by bit; what was known before is kept."""
+    found = []
+    for undone in ([], [(0.25, 1.2), (0.3, 1.4), (0.35, 1.4)]):
+        policy, seen = Plans(), []
+        policy.encoder = Looks()
+        operator = shared(policy)
+        policy.act = lambda state, around, *rest, seen=seen: seen.append(around) or ROWS[0]
+        later = [(0.25, 1.1), (0.3, 1.1), (0.35, 1.1)]
+        for time, x in [(0.05, 1.0), (0.1, 1.1), (0.15, 1.0), (0.2, 0.9), *undone, *later]:
+            policy.encoder.x = x
+            operator.act(view(time))
+        found.append(seen[-3:])
+    np.testing.assert_array_equal(*found)
+
+
+def test_what_any_hand_reaches_may_move():
+    """Law: a cube that a hand carries is where it is seen now, whichever of two that is."""
+    places = []
+    for hands in ([1.0], [9.0, 1.0], [9.0]):
+        encoder = Looks()
+        memory = SceneMemory(encoder.reads)
+        for encoder.x in np.linspace(1.0, 1.3, 20):
+            found = memory.take(encoder.look({}, {}, hands), 0)
+        places.append(float(found[0]))
+    assert places[0] == places[1]
+    assert places[1] > places[2] + 0.05
