@@ -236,12 +236,18 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""
-        return self.plant.checkpoint(), self._steps, self._sent
+        return self.plant, self.plant.checkpoint(), self._steps, self._sent
 
     def restore(self, checkpoint: Any) -> tuple[Observation, dict[str, Any]]:
-        """Come back to where the episode stood; from there all goes on as it did."""
-        plant, self._steps, self._sent = checkpoint
-        self.plant.restore(plant)
+        """Come back to where this episode stood; from there all goes on as it did."""
+        plant, state, steps, sent = checkpoint
+        if plant is not self.plant:
+            raise HandrailError(
+                f"environment {type(self.task).__name__}: expected a checkpoint of this episode, "
+                "got one from before reset()"
+            )
+        self.plant.restore(state)
+        self._steps, self._sent = steps, sent
         return self._shown(self.task_state())
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]

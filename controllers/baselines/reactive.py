@@ -70,6 +70,8 @@ class ReactiveController:
         self.surroundings = Surroundings.of(CollisionModel(self._model, obstacles), *self._margins)
         self._inputs = InputHistory()
         self._grippers = (math.nan,) * len(self.channels.hands)
+        self._command: Command | None = None  # the last one
+        self._time = math.nan  # when that was sent [s]
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""
@@ -84,7 +86,7 @@ class ReactiveController:
         status, self._inputs = self._validator.check(state, intent, makes_sense, self._inputs)
         if status is Status.OK and np.any(intent.mask & self._foreign):
             status = Status.INVALID_INTENT
-        previous = state.sent(self._model.description.limits)
+        previous = state.sent(self._model.description.limits, self._followed(state.time))
         target = np.zeros(self._model.size)
         if status is Status.OK:
             self._grippers = closed(intent.grippers, len(self._grippers))
@@ -100,7 +102,15 @@ class ReactiveController:
         solve_time = perf_counter() - start
         near = (np.inf, np.inf) if q is None else self._smallest(q)
         diagnostics = Diagnostics(status, solve_time, self.slack, *near)
-        return Command(velocities, self._period, grippers=self._grippers, diagnostics=diagnostics)
+        self._command = Command(velocities, self._period, grippers=self._grippers, diagnostics=diagnostics)
+        self._time = state.time
+        return self._command
+
+    def _followed(self, time: float) -> FloatArray | None:
+        """Return the velocity of the last command at a time, (n,); a period on where that is no later one."""
+        passed = time - self._time
+        known = 0.0 < passed < math.inf
+        return self._command.velocity(passed if known else self._period) if self._command else None
 
     def _asked(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         """Return the velocity wanted, checked: n finite numbers."""

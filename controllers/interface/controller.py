@@ -42,14 +42,19 @@ class State:
         near = self.expected is self.q or _known(self.expected, size)
         return told and near and _known(self.q, size) and _known(self.v, size)
 
-    def sent(self, limits: Limits) -> FloatArray:
+    def sent(self, limits: Limits, followed: FloatArray | None = None) -> FloatArray:
         """Return the velocity with which every command begins, (n,): the one sent last, within the limits.
 
         A command between two such velocities keeps the limit of acceleration whatever the robot does. Where
-        the robot does not say what it was sent, it is how it moves; where it does not say that, rest.
+        the robot does not say what it was sent, it is what it follows; where nobody knows that, how it moves;
+        where it does not say that, rest.
+
+        Args:
+            limits: of the robot.
+            followed: the velocity of the last command now, (n,).
         """
         size = len(limits.velocity)
-        for said in (self.commanded, self.v):
+        for said in (self.commanded, self.v if followed is None else followed):
             if _known(said, size):
                 return np.minimum(np.maximum(said, -limits.velocity), limits.velocity)
         return np.zeros(size)

@@ -67,19 +67,13 @@ class Supervisor:
         nobody has checked.
         """
         if distances is None:
-            stop = full_stop(self.limiter, self._sent_unseen(loop, state), self.settings.dt)
+            followed = loop.command.velocity(loop.elapsed(state.time)) if loop.command else None
+            stop = full_stop(self.limiter, state.sent(self.limiter.limits, followed), self.settings.dt)
             return Candidate(stop, Violation(np.inf, np.inf, 0.0))
         sent, elapsed = state.sent(self.limiter.limits), loop.elapsed(state.time)
         situation = Situation(state.expected, sent, distances, loop.command, elapsed)
         lag = None if state.expected is state.q else state.q - state.expected
         return self._backup(loop, lag).choose(situation, plan, halt)
-
-    def _sent_unseen(self, loop: LoopState, state: State) -> FloatArray:
-        """Return what a robot is being sent whose state is nonsense, (n,): what it follows, if anything."""
-        said, limits = state.commanded, self.limiter.limits
-        if loop.command is None or (said.shape == limits.velocity.shape and np.isfinite(said).all()):
-            return state.sent(limits)
-        return loop.command.velocity(loop.elapsed(state.time))
 
     def _backup(self, loop: LoopState, lag: FloatArray | None) -> Backup:
         settings = self.settings

@@ -69,7 +69,9 @@ def driven(request):
     return robot, ask
 
 
+UNKNOWN = dict.fromkeys(("q", "v", "commanded"), np.full(9, np.nan))
 BAD_STATES = [
+    *(UNKNOWN, UNKNOWN | {"time": np.nan}),
     *({"commanded": np.full(9, np.nan)}, {"commanded": np.zeros(4)}),
     *({"q": np.full(9, np.nan)}, {"q": HOME[:4], "v": np.zeros(4)}),
 ]

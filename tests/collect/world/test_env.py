@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import check_env
 
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
+from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.errors import HandrailError
 
@@ -53,6 +54,21 @@ def test_the_same_seed_gives_the_same_bytes(name):
         play(used, 4, steps=7)
         assert play(fresh, 5) == play(used, 5)
         assert play(fresh, 5) != play(fresh, 6)
+
+
+@pytest.mark.parametrize("plant", [IdealRobot, Simulation])
+def test_a_checkpoint_is_of_its_own_episode_alone(plant):
+    with environment("Reach", plant=plant) as env:
+        env.reset(seed=1)
+        then = env.checkpoint()
+        first = env.step(env.action_space.high)[0]
+        env.restore(then)
+        np.testing.assert_array_equal(env.step(env.action_space.high)[0]["agent_pos"], first["agent_pos"])
+        env.reset(seed=2)
+        now = env.state()
+        with pytest.raises(HandrailError, match=r"^environment Reach: .* this episode, .* before reset\(\)$"):
+            env.restore(then)
+        np.testing.assert_array_equal(env.state().q, now.q)
 
 
 @pytest.mark.needs_gl
