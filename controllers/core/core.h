@@ -106,6 +106,7 @@ typedef struct {
   double *path;              /* (N + 1, n) */
   double *speeds;            /* (N + 1, n) */
   double *slacks;            /* (4,) */
+  double shortfall;          /* of the distances in the plan, measured where the work ended [m] */
   double *distances;         /* (P,) now */
   int64_t solved;            /* whether the plan is one: finite, within the hard limits */
   int64_t changes;

@@ -116,6 +116,19 @@ static void finish(Core *c) {
   }
 }
 
+/* By how much the plan falls short of its distances, as `take_distances` wants them. */
+static double shortfall(Core *c, Scene *scene) {
+  double most = 0.0;
+  nodes_of(c, c->path, c->speeds);
+  scene_values(scene, c->K, c->nodes, c->times, c->path, c->distances, c->within, c->found);
+  for (int64_t i = c->P; i < c->K * c->P; i++) {
+    int64_t pair = i % c->P;
+    double deficit = LARGER(c->margins[pair] - c->distances[pair], 0.0);
+    most = LARGER(most, c->margins[pair] - deficit * pow(RECOVERY, (double)(i / c->P)) - c->found[i]);
+  }
+  return most;
+}
+
 /* Write the QP of a step from the guess: H, g and the rows; return the cost of the guess. */
 double build_program(Core *c, Scene *scene) {
   double start = clock_now();
@@ -144,4 +157,5 @@ void solve_update(Core *c, Scene *scene) {
     memcpy(c->guess, c->u, c->M * sizeof(double));
   }
   finish(c);
+  c->shortfall = c->work <= 0.0 ? shortfall(c, scene) : 0.0;
 }

@@ -58,7 +58,7 @@ class RealTimeSolver:
             q=frozen(core.path),
             v=frozen(core.speeds),
             u=frozen(core.u),
-            collision_slack=max(slacks[:LIMITS]),
+            collision_slack=max(*slacks[:LIMITS], core.fields.shortfall),
             limit_slack=max(slacks[LIMITS], excess),  # the plan may not keep all rows where the work ended
             distances=frozen(core.distances),
             solved=bool(core.fields.solved),

@@ -13,6 +13,7 @@ import pytest
 from ideal_robot import without_shapes
 from plans import is_solution
 
+from handrail.controllers.collision.slacks import LIMITS as LIMITS_SLACK
 from handrail.controllers.core.library import functions
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
@@ -21,6 +22,7 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.solvers import real_time
 from handrail.controllers.solvers.converged import ConvergedSolver
 from handrail.controllers.solvers.dense import dense
 
@@ -262,3 +264,21 @@ def test_a_closed_loop_follows_the_converged_solution():
 def test_closed_loops_from_200_random_states_follow_the_converged_solution():
     with single_threaded():
         check(closed_loops(count=200, updates=20, seed=5))
+
+
+@pytest.mark.parametrize("work", [300.0, 3e3])
+def test_where_the_work_ends_the_plan_says_by_how_much_it_falls_short(work, monkeypatch):
+    """Law: the slack is that of the plan's distances, not of the rows that the solver had come to."""
+    rng, mpc = np.random.default_rng(0), MaskedMpc(load_model())
+    monkeypatch.setattr(real_time, "_WORK", work)
+    toward, tool = np.eye(mpc.channels.size)[3], mpc.model.pose(DESCRIPTION.home).position
+    for _ in range(4):
+        places = tool + [0.45, 0.0, 0.0] + rng.uniform(-0.25, 0.25, (4, 3))
+        mpc.reset(tuple(Obstacle(f"b{i}", Shape("sphere", [0.15]), at) for i, at in enumerate(places)))
+        v = np.append([0.8, 0.0, 0.0], rng.uniform(-0.5, 0.5, 6))
+        ask = Intent(toward, mpc.channels.mask("ee"))
+        problem = mpc.build_problem(State(DESCRIPTION.home, v), ask)
+        plan = mpc.solver.solve(problem, np.zeros((mpc.settings.horizon, 9)))
+        exact = solver(mpc).evaluate(problem, plan.u).slack[:LIMITS_SLACK].max()
+        assert plan.collision_slack == pytest.approx(exact, abs=1e-9)
+        assert exact > 0.01
