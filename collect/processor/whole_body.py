@@ -68,7 +68,7 @@ class WholeBody:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
         self._b = len(model.description.base.joints)
         limits = model.description.limits
-        self._fastest = limits.velocity[self._b :]
+        self._fastest_base, self._fastest = limits.velocity[:3], limits.velocity[self._b :]
         self._ends = limits.position_lower[self._b :], limits.position_upper[self._b :]
         grippers = [hand.gripper for hand in model.description.hands]
         strokes = [each.speed / each.stroke if each else _STROKES for each in grippers]
@@ -142,7 +142,7 @@ class WholeBody:
         silent = now - self._heard > _SILENT * self._period
         self._rested = 0.0 if self._twist.any() or silent else self._rested + passed
         going = moved(self._expected(), self._twist, passed) - self._base
-        most = 2.0 * _HOLD * self._model.description.limits.velocity[:3]
+        most = 2.0 * _HOLD * self._fastest_base
         self._under_way = np.zeros(3) if self._rested > _HOLD else np.clip(going, -most, most)
         self._time = now if math.isfinite(now) else self._time
 
@@ -176,9 +176,8 @@ class WholeBody:
 
     def _leaps(self, reading: BodyReading, now: float) -> bool:
         """Return whether a joint is where it cannot have come since it was heard, or the base is too fast."""
-        fastest = self._model.description.limits.velocity[:3]
         way = self._fastest * max(now - self._heard, 0.0)
-        if self._b and bool((np.abs(reading.twist) > _PUSHED * fastest).any()):
+        if self._b and bool((np.abs(reading.twist) > _PUSHED * self._fastest_base).any()):
             return True
         return self._reading is not None and bool(
             (np.abs(reading.arm - self._reading.arm) > way + _LEAD).any()
@@ -200,14 +199,13 @@ class WholeBody:
         if reading.pose is not None:
             self._base = reading.pose
         if before is None and not self._rests:
-            fastest = self._model.description.limits.velocity[: self._b]
-            twist = turned(reading.twist, self._base[2])[: self._b]
-            self._gate.velocity[: self._b] = np.clip(twist, -fastest, fastest)
+            twist = turned(reading.twist, self._base[2])
+            within = np.clip(twist, -self._fastest_base, self._fastest_base)
+            self._gate.velocity[: self._b] = within[: self._b]
         if before is not None:
             change = self._base - base
             change[2] = math.remainder(change[2], 2.0 * math.pi)  # a heading may begin anew at ±π
-            fastest, passed = self._model.description.limits.velocity[:3], _passed(self._heard, now, math.inf)
-            farthest = passed * fastest + _LEAD
+            farthest = self._fastest_base * _passed(self._heard, now, math.inf) + _LEAD
             self._under_way -= np.where(np.abs(change) <= farthest, change, 0.0)  # else it was corrected
         self._reading = reading
         self._heard = now if math.isfinite(now) else self._heard

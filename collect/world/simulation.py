@@ -68,7 +68,7 @@ class Simulation(Plant):
         substeps = math.ceil(step / timestep - 1e-9)
         self._shares = np.arange(1, substeps + 1) / substeps
         trouble = f"robot {model.description.name} in its scene: MuJoCo says"
-        with restated(trouble, ValueError):  # such as two of one name
+        with restated(trouble, ValueError):
             spec = _robot(model, meshes, grips, step / substeps).copy()
             add_scene(spec, scene)
             self.mujoco_model = spec.compile()

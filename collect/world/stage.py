@@ -8,6 +8,7 @@ import numpy as np
 from handrail.collect.world import geometry
 from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
+from handrail.controllers.errors import restated
 from handrail.controllers.robot.description import SCENE_CAMERA
 
 
@@ -21,9 +22,11 @@ def new_stage(looks: bool) -> MjSpec:
 
 
 def add_scene(spec: MjSpec, scene: Scene) -> None:
-    """Add the objects and the scene camera to the spec."""
+    """Add the objects and the scene camera to the spec of a robot."""
     for item in scene.objects:
-        _add_object(spec, item)
+        thing = f"robot {spec.modelname}: expected no shape or joint called as the task's {item.name!r}"
+        with restated(f"{thing}; rename it in its description", ValueError):
+            _add_object(spec, item)
     spec.worldbody.add_camera(name=SCENE_CAMERA, fovy=scene.view.fovy, **_view_pose(scene.view))
 
 

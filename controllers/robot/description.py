@@ -257,7 +257,7 @@ def _check_names(robot: RobotDescription) -> None:
     """Check that shapes and cameras have names of their own, and that no others are used."""
     check_once(robot.camera_names, "camera")
     names = [shape.name for shape in robot.collision]
-    check_once(names, "collision")
+    check_once([*names, "floor"], "collision")  # where something else is the floor
     if "" in names:
         raise HandrailError(f"collision[{names.index('')}]: expected an entry 'name', found none")
     check_once([" and ".join(sorted(pair)) for pair in robot.self_pairs], "self_collision: pairs")

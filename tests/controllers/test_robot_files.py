@@ -65,13 +65,20 @@ def test_a_file_that_is_no_description_is_one_line(content, tmp_path):
         load_description(path)
 
 
-@pytest.mark.parametrize("name", ["floor", "finger_left", "cube"])
-def test_a_shape_with_a_name_that_is_taken_is_one_line(name, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("floor", "collision: expected each once, got 'floor' twice"),
+        ("finger_left", "repeated name 'finger_left'"),
+        ("cube", "robot ridgeback_ur10: expected no shape or joint called as the task's 'cube'; rename it"),
+    ],
+)
+def test_a_shape_with_a_name_that_is_taken_is_one_line(name, words, tmp_path):
     """By the floor, by a finger of the gripper, by what stands in the scene."""
     path = tmp_path / "robot.toml"
     shape = f'[[collision]]\nname = "{name}"\nframe = "planar_base"\nsphere = 0.1\n\n[[visual]]'
     path.write_text(TEXTS["ridgeback_ur10"].replace("[[visual]]", shape, 1))
-    refused("--robot", path, "--task", "pick_place", "--dataset.root", tmp_path / "set")
+    assert words in refused("--robot", path, "--task", "pick_place", "--dataset.root", tmp_path / "set")
     assert not (tmp_path / "set").exists()
 
 
