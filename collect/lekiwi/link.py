@@ -75,7 +75,7 @@ class Link:
             )
         self.body = WholeBody(model, units, period)
         self._said: Mapping[str, Any] = {}
-        self._sent_at, self.late = math.inf, 0
+        self._due, self.late = math.inf, 0
         self.asked: Callable[[], EpisodeEvent | None] = lambda: None
         self._lock, self._closed = threading.Lock(), threading.Event()
         self._episode, self._seed = 0, 0
@@ -119,9 +119,9 @@ class Link:
     def brake_if_late(self) -> None:
         """Send the robot a period of the full stop, if the command after the last one is late."""
         with self._lock:
-            if self._clock() - self._sent_at > _LATE * self.period and self.body.velocity.any():
+            if self._clock() > self._due and self.body.velocity.any():
                 self.body.pass_time(self._clock())
-                self._send(())
+                self._send((), 1.0)
                 self.late += 1
 
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> dict[str, NDArray[np.uint8]]:
@@ -145,12 +145,13 @@ class Link:
         if self.late:
             _log.warning("robot %s: commands were late; it braked for %d periods", self._name, self.late)
 
-    def _send(self, command: ArrayLike) -> None:
+    def _send(self, command: ArrayLike, late: float = _LATE) -> None:
+        """Send a command; the next one is late after so many periods."""
         self._action = self.body.send(command)
         if self._simulated:
             self._action |= {EPISODE: self._episode, SEED: self._seed, SENT: time.time()}
         self._client.send_action(self._action)
-        self._sent_at = self._clock()
+        self._due = self._clock() + late * self.period
 
     def _watch(self) -> None:
         """Brake while commands are late; what a driver's code raises here, it raises in the loop as well."""

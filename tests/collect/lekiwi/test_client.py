@@ -185,6 +185,25 @@ def test_a_base_whose_next_command_is_late_is_sent_the_stop_and_that_is_said(cap
     assert "commands were late" in caplog.text
 
 
+def test_from_a_late_command_on_each_period_is_one_of_the_full_stop():
+    """Law: it is late 1.5 periods after the one before; then the base brakes as fast as its limits say."""
+    client = PlayedClient()
+    far = link(client)
+    for _ in range(20):
+        far.exchange([0.2, 0, 0, 0, 0, 0, 0, 0, 0])
+    speed, began = far.body.velocity[0], client.clock.now - far.period
+    step = far.model.description.limits.acceleration[0] * far.period
+    assert speed > 4 * step
+    while far.body.velocity.any():
+        client.sleep(0.5 * far.period + 1e-6)
+        far.brake_if_late()
+        periods = (client.clock.now - began) / far.period
+        braked = np.floor(periods - 0.5)
+        assert far.body.velocity[0] == pytest.approx(max(speed - step * braked, 0.0), abs=1e-6)
+    assert periods < 2.5 + speed / step
+    far.close()
+
+
 @pytest.mark.parametrize("fps", [20, 30, 50])
 def test_a_robot_that_says_nothing_new_does_not_make_the_next_command_late(fps):
     """LeRobot's client waits for news; an operator, the MPC and the recorder need a fifth of the period."""
