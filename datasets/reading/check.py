@@ -1,23 +1,34 @@
 """Checking a dataset before it is used: is everything there that was saved, and is it what was saved?"""
 
+import math
 import os
 import shlex
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from handrail.controllers.errors import HandrailError, restated
-from handrail.controllers.regular_file import regular
+import msgspec
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from handrail.controllers.errors import HandrailError, first_line, restated
+from handrail.controllers.regular_file import read_regular, regular
 from handrail.datasets.format.episode_rows import ForeignRowError
+from handrail.datasets.format.info_file import read_encodings, summary_files
 from handrail.datasets.format.layout import FOLDERS, Layout
 from handrail.datasets.format.manifest import read_manifest
-from handrail.datasets.format.schema import video_keys
+from handrail.datasets.format.schema import AUTOMATIC, features_of, video_keys
+from handrail.datasets.format.tables import UNREADABLE
 from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo, open_dataset, read_episodes, read_info
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.survey import Survey, shortened, survey
 from handrail.datasets.storage.atomic import explained
-from handrail.datasets.storage.strict_json import read_json
+from handrail.datasets.storage.strict_json import MOST_BYTES, parse_json
+
+_ROUNDING = 1e-6
 
 
 def check_whole(root: str | Path, verify: bool = False) -> None:
@@ -30,10 +41,17 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
     info, found = _surveyed(root, verify)
     if found is not None:
         found.require_whole()
+        repair = f"handrail-edit repair {shlex.quote(str(info.root))}"
+        manifest = read_manifest(found.layout)
+        recorded = {key: feature for key, feature in info.features.items() if key not in AUTOMATIC}
+        said = replace(manifest, fps=info.fps, robot_type=info.robot_type, features=recorded)
+        said.check_fits(
+            manifest, f"dataset {str(info.root)!r}: meta/info.json was changed; {repair} writes it anew"
+        )
         if stray := [found.layout.relative(each) for each in found.unknown if each.suffix == ".parquet"]:
             raise HandrailError(
                 f"dataset {str(info.root)!r}: LeRobot reads files of no episode, {shortened(stray, ', ')};"
-                f" handrail-edit repair {shlex.quote(str(info.root))} moves them to .damaged"
+                f" {repair} moves them to .damaged"
             )
     if missing := _missing(info):
         raise HandrailError(
@@ -53,18 +71,10 @@ def check_report(root: str | Path) -> list[str]:
         other = f"other content than was saved, but the right frames; {advice}"
         unknown = [f"{found.layout.relative(path)}: no file of a LeRobot dataset" for path in found.unknown]
         faults = [*found.damage, *(f"{name}: {other}" for name in found.rewritten), *unknown]
-        totals, said = found.totals, "meta/info.json: does not count the episodes that are there"
-        if not found.damage and (info.episodes, info.frames) != (totals.episodes, totals.frames):
-            faults.append(f"{said}; {repair} writes it anew")
     layout = Layout(info.root)
     summary = (layout.stats, layout.tasks) if info.episodes else ()
     faults += [f"{path.name}: missing" for path in summary if not path.exists()]
-    try:
-        if layout.stats.exists():
-            read_json(layout.stats)
-    except (OSError, ValueError) as error:
-        faults.append(f"meta/{layout.stats.name}: {error}")
-    return faults
+    return [*faults, *_summary_faults(layout, found, f"; {repair} writes it anew")]
 
 
 def has_checksums(root: str | Path) -> bool:
@@ -90,6 +100,49 @@ def _surveyed(root: str | Path, verify: bool) -> tuple[DatasetInfo, Survey | Non
         return info, survey(layout, read_manifest(layout), Checksums(info.root, anew=verify))
     except ForeignRowError:
         return info, None
+
+
+def _summary_faults(layout: Layout, found: Survey | None, advice: str) -> Iterator[str]:
+    """Yield which summary files cannot be read, or do not say what the episodes say; `advice` ends a line."""
+    wanted: dict[Path, bytes | None] = {layout.stats: None}
+    if found is not None and found.totals.episodes == found.episodes:
+        manifest = read_manifest(layout)
+        wanted = summary_files(layout, manifest, found.totals, read_encodings(layout, manifest))
+    for path, data in wanted.items():
+        if not path.exists():
+            continue
+        try:
+            said = _content(path, read_regular(path, MOST_BYTES))
+            right = said if data is None else _content(path, data)
+        except UNREADABLE as error:
+            yield f"{layout.relative(path)}: {first_line(error)}"
+            continue
+        keys = right if path == layout.info else {**right, **said}  # other tools may say more of a dataset
+        if odd := [key for key in keys if not _alike(said.get(key), right.get(key))]:
+            yield f"{layout.relative(path)}: not what the episodes say of {shortened(odd, ', ')}{advice}"
+
+
+def _content(path: Path, data: bytes) -> dict[str, Any]:
+    """Return what a summary file says, by names; of the tasks, their numbers by their sentences."""
+    if path.suffix == ".parquet":
+        columns = pq.read_table(pa.BufferReader(data)).to_pydict()
+        places = columns.pop("task_index")
+        (sentences,) = columns.values()
+        return dict(zip(sentences, places, strict=True))
+    content = msgspec.convert(parse_json(data), dict[str, Any])
+    described = path.name == "info.json"
+    return content | {"features": features_of(content["features"])} if described else content
+
+
+def _alike(said: Any, right: Any) -> bool:
+    """Return whether a value of a summary file is the right one, but for rounding."""
+    if isinstance(right, dict):
+        return isinstance(said, dict) and all(_alike(said.get(key), each) for key, each in right.items())
+    if isinstance(right, list):
+        return isinstance(said, list) and len(said) == len(right) and all(map(_alike, said, right))
+    if isinstance(right, float) and isinstance(said, float | int):
+        return math.isclose(said, right, rel_tol=_ROUNDING, abs_tol=_ROUNDING)
+    return said == right
 
 
 def _missing(info: DatasetInfo) -> list[str]:
