@@ -50,6 +50,9 @@ class PolicyInterface:
     """The sets of channels that the operator owned, (m,) each; of `intent` alone."""
     base_pose: bool = False
     """Whether it sees where the base is; older checkpoints do not say, and do not."""
+    turned_velocities: bool = False
+    """Whether it sees velocities of obstacles in the base's axes; older checkpoints do not say, and see those
+    in the world's axes."""
 
     def __post_init__(self) -> None:
         """Check the masks, and that what the view starts from is there."""
@@ -87,7 +90,7 @@ class PolicyInterface:
             masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
         if actions == "intent" and not any(map(any, masks)):
             raise HandrailError("intent as action: expected episodes in which an operator steers, got none")
-        return cls(actions, state, environment, channels, tuple(sorted(masks)), base_pose)
+        return cls(actions, state, environment, channels, tuple(sorted(masks)), base_pose, True)
 
     @property
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -125,7 +128,8 @@ class PolicyInterface:
         around: list[FloatArray] = [np.zeros((len(state), 0))]
         for _, parts, start in self.objects:
             numbers = environment[:, start : start + len(parts)]
-            around += [seen(parts, numbers, pose) for pose in (poses if parts in SEEN else poses[:1])]
+            seers = poses if parts in SEEN else poses[:1]
+            around += [seen(parts, numbers, pose, self.turned_velocities) for pose in seers]
         return np.column_stack(own).astype(np.float32), np.column_stack(around).astype(np.float32)
 
     def encode(self, columns: Columns) -> FloatArray:

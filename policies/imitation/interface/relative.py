@@ -82,13 +82,14 @@ class RobotPose:
         return np.column_stack([self.base[:, :2], np.cos(yaw), np.sin(yaw)])
 
 
-def seen(parts: tuple[str, ...], numbers: FloatArray, pose: RobotPose) -> FloatArray:
+def seen(parts: tuple[str, ...], numbers: FloatArray, pose: RobotPose, turn_velocity: bool) -> FloatArray:
     """Return an object as seen from the robot, (T, k).
 
     Args:
         parts: names of its numbers.
         numbers: as recorded, (T, p).
         pose: of the robot.
+        turn_velocity: whether the velocity of a moving obstacle is turned too.
     """
     if parts in SEEN:
         offset = pose.turned(numbers[:, :3] - pose.tool)
@@ -103,7 +104,9 @@ def seen(parts: tuple[str, ...], numbers: FloatArray, pose: RobotPose) -> FloatA
     if parts[:2] == ("x", "y"):
         there = numbers.any(axis=1, keepdims=True)  # what is not there stays zero
         place = pose.turned(numbers[:, :2] - pose.base[:, :2])
-        return np.column_stack([np.where(there, place, 0.0), numbers[:, 2:]])
+        velocity, others = np.split(numbers[:, 2:], [2 if parts[2:4] == ("vx", "vy") else 0], axis=1)
+        velocity = pose.turned(velocity) if turn_velocity and velocity.size else velocity
+        return np.column_stack([np.where(there, place, 0.0), velocity, others])
     return numbers
 
 

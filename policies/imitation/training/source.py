@@ -152,7 +152,9 @@ def read_source(
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
     else:
-        interface, features, columns = _interpreted(info, selection, config, config.actions, encoder, earlier)
+        interface, features, columns = _interpreted(
+            info, selection, config, config.actions, encoder, earlier, began
+        )
     if config.images:
         if not (cameras := pictured(info)):
             raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
@@ -191,6 +193,7 @@ def _interpreted(
     actions: Literal["realised", "intent"],
     encoder: Encoder | None,
     earlier: PolicyMeta | None,
+    began: PolicyMeta | None,
 ) -> tuple[PolicyInterface, Features, Columns]:
     """Return what a policy learns through an interface."""
     if actions == "intent":
@@ -206,6 +209,8 @@ def _interpreted(
     interface = PolicyInterface.of_dataset(features, masks, actions, config.base_pose)
     if earlier:
         interface = same_interface(config.init, earlier, interface)
+    if began and began.interface:  # it goes on with the view that it has
+        interface = replace(interface, turned_velocities=began.interface.turned_velocities)
 
     def learnt(episode: Columns) -> Columns:
         state, environment = interface.observe(episode[STATE], episode[ENVIRONMENT])

@@ -25,6 +25,7 @@ ENVIRONMENT = (
     "inward.nx",
     "inward.ny",
     "drawer.opening",
+    *(f"mover_0.{part}" for part in ("x", "y", "vx", "vy", "radius", "height")),
     *(f"obstacle_0.{part}" for part in ("x", "y", "radius", "height")),
     *(f"obstacle_1.{part}" for part in ("x", "y", "radius", "height")),
 )
@@ -82,9 +83,10 @@ def moved(columns, shift, angle):
         numbers[:, at : at + 2] = numbers[:, at : at + 2] @ flat.T + shift
         quaternion = Rotation.from_quat(numbers[:, at + 3 : at + 7], scalar_first=True)
         numbers[:, at + 3 : at + 7] = (turn * quaternion).as_quat(scalar_first=True)
-    for at in (7, 13):  # bin, obstacle_0
+    for at in (7, 13, 19):  # bin, mover_0, obstacle_0
         environment[:, at : at + 2] = environment[:, at : at + 2] @ flat.T + shift
-    environment[:, 10:12] = environment[:, 10:12] @ flat.T
+    for at in (10, 15):  # inward, the velocity of mover_0
+        environment[:, at : at + 2] = environment[:, at : at + 2] @ flat.T
     values, start = out["teleop.values"], CHANNELS.hand_slice().start
     for at in (start, start + 3, CHANNELS.joint_slice.start):
         values[:, at : at + 2] = values[:, at : at + 2] @ flat.T
@@ -117,12 +119,20 @@ def test_a_policy_sees_where_the_base_is():
 
 
 def test_an_older_checkpoint_keeps_its_view():
-    """It does not say whether it sees where the base is: then it does not."""
-    _, interface = made(3, "intent")
+    """It does not say whether it sees where the base is, and velocities in the base's axes: it does not."""
+    columns, interface = made(3, "intent")
     content = json.loads(json.dumps(dataclasses.asdict(interface)))
     assert read_interface(content) == interface
-    del content["base_pose"]
-    assert read_interface(content) == dataclasses.replace(interface, base_pose=False)
+    del content["base_pose"], content["turned_velocities"]
+    older = read_interface(content)
+    assert older == dataclasses.replace(interface, base_pose=False, turned_velocities=False)
+    (_, before), (_, around) = observed(older, columns), observed(interface, columns)
+    names = interface.observation_names[1]
+    start = names.index("mover_0.vx")
+    recorded = columns["observation.environment_state"][:, ENVIRONMENT.index("mover_0.vx") :][:, :2]
+    np.testing.assert_array_equal(before[:, start : start + 2], recorded.astype(np.float32))
+    changed = (before != around).any(axis=0)
+    assert [name for name, each in zip(names, changed, strict=True) if each] == ["mover_0.vx", "mover_0.vy"]
     with pytest.raises(HandrailError, match="base_pose: expected true or false"):
         read_interface(content | {"base_pose": "yes"})
 

@@ -50,6 +50,17 @@ def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recor
     assert read_meta(resumed).trained_on == meta.trained_on
 
 
+def test_a_training_keeps_the_view_of_the_policy_that_it_goes_on_from(trained):
+    """An older one sees the velocities of obstacles as they are recorded."""
+    folder, config = trained
+    meta = read_meta(folder)
+    older = dataclasses.replace(meta.interface, turned_velocities=False)
+    known = dataclasses.replace(meta, interface=older)
+    assert read_source(config).interface == meta.interface != older
+    assert read_source(config, began=known).interface == older
+    assert read_source(config, earlier=known).interface == older
+
+
 def test_a_training_does_not_go_on_with_other_data_steps_or_sizes(trained, tmp_path, monkeypatch):
     config = cut(trained[1], tmp_path / "cut")
     longer, fewer = (canned(write_dataset, lengths=lengths) for lengths in ((9, 8, 7), (9, 7)))
