@@ -114,7 +114,7 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     path, step = place / _TRAINED, place.parent.name
     content = load_json(path, "settings of LeRobot") if path.is_file() else {}
     training = check(content, _Trained, repr(str(path)))
-    root, fps = Path((training.get("dataset") or {}).get("root") or place), config.fps
+    root, fps = Path((training.get("dataset") or {}).get("root") or place), config.fps or 20
     origin: dict[str, Any] = {"environment": "", "robot": ""}
     with suppress(HandrailError, OSError):  # it need not be here
         origin, fps = origin_of(info := read_info(root), read_episodes(root)), info.fps
@@ -221,7 +221,7 @@ def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], li
     checkpoints, found = [], dict[tuple[str, tuple[int, int]], PolicyCondition]()
     for folder in config.folders:
         try:
-            checkpoints.append(read_checkpoint(folder, config))
+            checkpoints.append(_as_asked(read_checkpoint(folder, config), config))
         except HandrailError as error:
             refused[str(error)] = None
     environments = {checkpoint.meta.environment for checkpoint in checkpoints}
@@ -244,6 +244,17 @@ def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], li
     if not found:
         raise HandrailError("; ".join(refused))
     return list(found.values()), list(refused)
+
+
+def _as_asked(checkpoint: Checkpoint, config: EvaluateConfig) -> Checkpoint:
+    """Return a checkpoint whose mode and rate are those of the settings, where these say any."""
+    for name in ("mode", "fps"):
+        asked, own = getattr(config, name), getattr(checkpoint.meta, name)
+        if asked and asked != own:
+            raise HandrailError(
+                f"--policy {checkpoint.folder}: expected --{name} {asked}, got one of {own!r}"
+            )
+    return checkpoint
 
 
 def own_protection(mode: str) -> str:

@@ -7,14 +7,14 @@ from typing import Annotated
 import tyro
 from msgspec import Meta
 
-from handrail.collect.config import FPS_RANGE, MOST_TIME
+from handrail.collect.config import MOST_TIME, check_fps
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_file, check_names, names, one_of, only_one
 from handrail.collect.seeds import MOST_ROLLOUTS, evaluation_seed
 from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.typed import check_settings
+from handrail.controllers.typed import Count, check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names, Words
 
@@ -50,8 +50,8 @@ class EvaluateConfig(ExecutionConfig):
     """The robot of policies that do not say it, or that say a module:name."""
     hand: Advanced[str] = ""
     """Which hand does the task, of a robot with several; that of the demonstrations by default."""
-    fps: Advanced[Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])]] = 20
-    """Decisions a second of such policies: the rate of their dataset, where that is not there [Hz]."""
+    fps: Advanced[Count] = 0
+    """Decisions a second of such policies: the rate of their dataset, where that is not there [Hz]; 0 for 20."""
     time_limit: Advanced[Annotated[float, Meta(ge=0, le=MOST_TIME)]] = 0.0
     """Time after which a rollout is given up [s]; when 0, that of the demonstrations, or the task's own."""
     video: str = ""
@@ -86,6 +86,8 @@ class EvaluateConfig(ExecutionConfig):
         self.check_execution()
         if self.task:
             TASKS.check(self.task)
+        if self.fps:
+            check_fps(self.fps, "--fps")
         check_names("protection", "--protection", self.protections, PROTECTIONS)
         if not self.perturbations or len(set(self.perturbations)) != len(self.perturbations):
             raise HandrailError(f"--perturbation {self.perturbation}: expected one or more, each once")

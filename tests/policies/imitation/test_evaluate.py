@@ -266,3 +266,16 @@ def test_the_same_scenes_under_more_policies_are_no_more_scenes():
     (one,), (three,) = (table.rows for table in tables)
     assert (one[2], three[2]) == ("66/100 = 66%", "198/300 = 66%")
     assert one[3] == three[3] == "56% – 75%"
+
+
+def test_a_mode_or_rate_that_the_policy_says_itself_is_taken_or_refused(folder):
+    said = policy_conditions(config(folder, "chase"))
+    assert policy_conditions(config(folder, "chase", mode="ee", fps=20)) == said
+    for other, named in (
+        ({"mode": "direct"}, "--mode direct, got one of 'ee'"),
+        ({"fps": 30}, "--fps 30, got one of 20"),
+    ):
+        with pytest.raises(HandrailError, match=rf"\A--policy .*chase: expected {named}\Z"):
+            policy_conditions(config(folder, "chase", **other))
+    with pytest.raises(HandrailError, match="--fps 5: expected 10 to 100"):
+        config(folder, "chase", fps=5).check()
