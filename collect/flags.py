@@ -8,6 +8,7 @@ import tyro
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.registry import Registry
+from handrail.datasets.storage.atomic import check_room
 
 
 def only_one[Given](place: Given, flagged: Given, flag: str) -> Given:
@@ -51,6 +52,10 @@ def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: Collect
 
 def check_file(flag: str, file: str, ending: str = "") -> None:
     """Check that a file can be written, if one is asked for."""
-    if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
+    if not file:
+        return
+    path = Path(file).expanduser().absolute()
+    if not file.endswith(ending) or path.is_dir() or not path.parent.is_dir():
         kind = f"{ending} file" if ending else "file"
         raise HandrailError(f"{flag} {file}: expected a {kind} in an existing folder")
+    check_room(f"{flag} {file}", path.parent)

@@ -72,7 +72,7 @@ def repair(config: RepairConfig) -> int:
 
 def push(config: PushConfig) -> None:
     """Write a dataset's card, print what would be sent, and send it when asked."""
-    from handrail.datasets.editing.push import copy, prepare, upload
+    from handrail.datasets.editing.push import copy, free_place, prepare, upload
 
     dataset, say = config.dataset, Terminal().print
 
@@ -85,6 +85,8 @@ def push(config: PushConfig) -> None:
             say(f"The card gets no picture: {error}")
             return b""
 
+    if config.upload and config.to:
+        free_place(config.to)
     settings = config.license, config.private, config.verify, config.to
     push = prepare(dataset.folder, dataset.repo_id, *settings, preview)
     say(str(push))

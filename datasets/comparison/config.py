@@ -11,6 +11,7 @@ from handrail.controllers.typed import Count, Positive, check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Words
 from handrail.datasets.reading.columns import ColumnNames
+from handrail.datasets.storage.atomic import check_room
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,7 @@ class CompareConfig:
         elif not self.datasets:
             raise HandrailError("dataset: expected one folder or more, before the flags; got none")
         check_settings(self, "--")
-        if self.folder.exists() and not self.folder.is_dir():
-            raise HandrailError(f"--output {self.output}: expected a folder, found a file")
+        check_room(f"--output {self.output}", self.folder)
 
     def _check_study(self) -> None:
         """Check that nothing is asked for that a comparison of people does not have."""

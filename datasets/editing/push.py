@@ -6,7 +6,7 @@ stay, and episodes of a user study's participants are not sent at all.
 
 import os
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from itertools import groupby
@@ -14,6 +14,8 @@ from pathlib import Path
 
 import fsspec
 import numpy as np
+from fsspec.implementations.local import LocalFileSystem
+from fsspec.spec import AbstractFileSystem
 from huggingface_hub import HfApi
 
 from handrail.controllers.errors import HandrailError, message_of, restated
@@ -26,7 +28,7 @@ from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.load import some_recorded
 from handrail.datasets.reading.reader import open_dataset, read_info
-from handrail.datasets.storage.atomic import explained, write_whole
+from handrail.datasets.storage.atomic import check_room, explained, write_whole
 
 CARD = "README.md"
 PREVIEW = "meta/preview.webp"
@@ -134,19 +136,33 @@ def upload(push: Upload) -> None:
         raise HandrailError(f"--upload: the hub did not take {push.repo_id}: {message_of(error)}") from error
 
 
-def copy(push: Upload) -> None:
-    """Copy a dataset to an address of a file system that fsspec knows: empty, or with a copy cut short."""
-    try:
-        system, place = fsspec.url_to_fs(push.to)
+def free_place(to: str, sent: Collection[str] = ()) -> tuple[AbstractFileSystem, str]:
+    """Return the store that an address names, and the place in it, once a dataset may be copied there.
+
+    Args:
+        to: The address, of a file system that fsspec knows.
+        sent: The files of the dataset; some may be there, of a copy cut short.
+    """
+    with restated(f"--to {to}"):  # every store fails in ways of its own
+        system, place = fsspec.url_to_fs(to)
         place = place.rstrip("/")
         system.invalidate_cache()
         found = system.find(place) if system.exists(place) else []
-        names = {path.removeprefix(f"{place}/") for path in found}
-        if _LAST in names or not names <= set(push.files):
-            raise HandrailError(
-                f"--to {push.to}: expected nothing there, or a copy of this dataset that was cut short; found"
-                f" {len(names)} files; choose another place"
-            )
+    names = {path.removeprefix(f"{place}/") for path in found}
+    if isinstance(system, LocalFileSystem):
+        check_room(f"--to {to}", Path(place))
+    if _LAST in names or (sent and not names <= set(sent)):
+        raise HandrailError(
+            f"--to {to}: expected nothing there, or a copy of this dataset that was cut short; found"
+            f" {len(names)} files; choose another place"
+        )
+    return system, place
+
+
+def copy(push: Upload) -> None:
+    """Copy a dataset to its place."""
+    system, place = free_place(push.to, push.files)
+    with restated(f"--to {push.to}: the dataset could not be copied there"):
         for name in sorted(push.files, key=lambda name: name == _LAST):
             target = f"{place}/{name}"
             system.makedirs(target.rpartition("/")[0], exist_ok=True)
@@ -154,11 +170,6 @@ def copy(push: Upload) -> None:
             sizes = (push.root / name).stat().st_size, system.size(target)
             if sizes[0] != sizes[1]:
                 raise OSError(f"{name} has {sizes[1]} bytes there, expected {sizes[0]}")
-    except HandrailError:
-        raise
-    except Exception as error:  # every store fails in ways of its own
-        said = f"the dataset could not be copied there: {message_of(error)}"
-        raise HandrailError(f"--to {push.to}: {said}") from error
 
 
 def _check_nobody(root: Path) -> None:

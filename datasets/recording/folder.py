@@ -8,7 +8,7 @@ from pathlib import Path
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import DAMAGED, FOLDERS, NUMBERED, STAGING, Layout
 from handrail.datasets.recording.survey import shortened
-from handrail.datasets.storage.atomic import move, remove
+from handrail.datasets.storage.atomic import check_room, move, remove
 from handrail.datasets.storage.lock import LOCK_NAME
 
 _OURS = re.compile(
@@ -26,13 +26,7 @@ def check_target(layout: Layout, overwrite: bool) -> None:
         overwrite: Whether a dataset that Handrail recorded there may go.
     """
     root = layout.root
-    existing = next(path for path in (root, *root.parents) if path.exists())
-    if not existing.is_dir():
-        raise HandrailError(f"{str(root)!r}: expected a folder, but {str(existing)!r} is a file")
-    if not os.access(existing, os.W_OK | os.X_OK):
-        raise HandrailError(
-            f"{str(root)!r}: expected a folder that can be written, but {str(existing)!r} cannot"
-        )
+    check_room(repr(str(root)), root)
     check_folders(layout)
     paths = [path for path in root.iterdir() if path.name != STAGING] if root.is_dir() else []
     names = sorted(path.name for path in paths if not path.is_dir() or any(path.iterdir()))

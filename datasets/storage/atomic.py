@@ -38,6 +38,15 @@ def beside(path: Path, ending: str) -> Path:
     return path.with_name(f".{path.name}.{ending}")
 
 
+def check_room(what: str, path: Path) -> None:
+    """Check that a folder is there or can be made, and can be written; `what` begins the error."""
+    existing = next(each for each in (path, *path.absolute().parents) if each.exists())
+    if not existing.is_dir():
+        raise HandrailError(f"{what}: expected a folder, but {str(existing)!r} is a file")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise HandrailError(f"{what}: expected a folder that can be written, but {str(existing)!r} cannot")
+
+
 def write_synced(path: Path, data: bytes) -> None:
     """Write a file and wait until the disk has it.
 

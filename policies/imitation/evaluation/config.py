@@ -51,7 +51,7 @@ class EvaluateConfig(ExecutionConfig):
     hand: Advanced[str] = ""
     """Which hand does the task, of a robot with several; that of the demonstrations by default."""
     fps: Advanced[Count] = 0
-    """Decisions a second of such policies: the rate of their dataset, where that is not there [Hz]; 0 for 20."""
+    """Decisions a second of such policies [Hz]; 0: those of their dataset, or 20 where that is not there."""
     time_limit: Advanced[Annotated[float, Meta(ge=0, le=MOST_TIME)]] = 0.0
     """Time after which a rollout is given up [s]; when 0, that of the demonstrations, or the task's own."""
     video: str = ""

@@ -187,7 +187,8 @@ WRONG = [
     (("{quick}", "{quick}"), r"two datasets are called 'set/quick'"),
     ((*BOTH, "--baseline", "z"), "unknown baseline 'z': expected one of quick, slow"),
     ((*BOTH, "--margin", "-1"), "--margin: expected a number >= "),
-    ((*BOTH, "--output", "{quick}/meta/info.json"), "expected a folder, found a file"),
+    ((*BOTH, "--output", "{quick}/meta/info.json"), "expected a folder, but '.*info.json' is a file"),
+    (("nowhere", "--output", "{quick}/meta/info.json/a/b"), "expected a folder, but '.*info.json' is a file"),
     ((*BOTH, "--evaluations", "no.json"), "no.json': expected evaluations"),
     ((*BOTH, "--speed", "9"), "--speed"),
 ]

@@ -244,3 +244,12 @@ def test_a_place_that_is_none_is_one_line(to, root):
     said = push(root, "--to", to, "--upload", code=2).stderr
     assert "--to" in said
     assert said.count("\n") == 1
+
+
+def test_a_place_that_cannot_take_a_dataset_is_refused_before_the_dataset_is_read(root, store, tmp_path):
+    push(root, "--to", STORE, "--upload")
+    (root / "README.md").unlink()
+    (tmp_path / "taken").write_text("mine")
+    for to in ("nosuch://bucket/reach", STORE, f"file://{tmp_path}/taken", f"file://{tmp_path}/taken/below"):
+        assert f"--to {to}: " in push(root, "--to", to, "--upload", code=2).stderr
+        assert not (root / "README.md").exists()

@@ -209,6 +209,17 @@ def test_wrong_input_is_one_clear_line(case, folder):
         evaluate(config(folder, *names, **settings), load=load)
 
 
+@pytest.mark.parametrize(("flag", "ending"), [("video", ".mp4"), ("json", ".json")])
+def test_a_file_that_cannot_be_written_is_refused_at_once(flag, ending, folder, tmp_path, monkeypatch):
+    place = tmp_path / f"there{ending}"
+    place.mkdir()
+    with pytest.raises(HandrailError, match=f"expected a {ending} file in an existing folder"):
+        config(folder, "chase", **{flag: str(place)}).check()
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(HandrailError, match=f"--{flag} .*: expected a folder that can be written, but"):
+        config(folder, "chase", **{flag: str(tmp_path / f"free{ending}")}).check()
+
+
 def test_a_file_of_something_else_is_not_added_to(folder, tmp_path):
     file = tmp_path / "e.json"
     asked = config(folder, "chase", json=str(file), episodes=1, time_limit=0.5)
