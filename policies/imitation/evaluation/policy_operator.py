@@ -60,7 +60,7 @@ class PolicyOperator:
         self, policy: TrainedPolicy, checkpoint: Checkpoint, env: HandrailEnv, period: float = 0.0
     ) -> None:
         meta, size = checkpoint.meta, Channels.of(env.model.description).size
-        self._policy, self._mode, self._task = policy, meta.mode, env.task.description
+        self._policy, self._mode, self._task = policy, meta.mode, meta.task or env.task.description
         self._interface = meta.interface or RecordedColumns(checkpoint)
         self._unusable = Intent(np.full(size, np.nan), np.ones(size, bool))
         self._period = period

@@ -91,6 +91,8 @@ class PolicyMeta:
     """Which of several hands does the task; "mixed" if several did, "" of one hand."""
     validation: Mapping[Annotated[str, Meta(pattern=r"\A[0-9]+\Z")], Number] = field(default_factory=dict)
     """Loss on the episodes that were held out, by update."""
+    task: str = ""
+    """The one sentence that says what is done in its episodes; "" of several, or if they do not say."""
 
     @property
     def intent_mode(self) -> str:

@@ -1,4 +1,4 @@
-"""The origin of a policy's episodes, as their rows say: task, mode, robot, hand and time.
+"""The origin of a policy's episodes, as their rows say: task, its sentence, mode, robot, hand and time.
 
 A row may name a `module:name`; it is read, and nothing that it names is imported.
 """
@@ -20,10 +20,10 @@ from handrail.policies.imitation.interface.checkpoint import MIXED
 
 
 def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return `environment`, `mode`, `robot`, `hand` and `time_limit` of episodes, as a policy keeps them.
+    """Return `environment`, `task`, `mode`, `robot`, `hand` and `time_limit`, as a policy keeps them.
 
-    "mixed" of several, "" and 0 where they do not say. A robot that is the path of a file is called as the
-    dataset calls it.
+    "mixed" of several, but no `task` of several; "" and 0 where they do not say. A robot that is the path
+    of a file is called as the dataset calls it.
     """
     recorded = _recorded(rows)
     found = {name: {str(row.get(name) or "") for row in rows} for name in ("environment", "mode", "robot")}
@@ -32,7 +32,9 @@ def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> dict[str,
     robot = origin["robot"]
     if not robot or "/" in robot or robot.endswith(".toml"):
         origin["robot"] = re.sub(r"[^\w+:,.\- ]", "-", info.robot_type)
-    return origin | {"time_limit": _time_limit(recorded)}
+    sentences = {sentence for row in rows for sentence in row.get("tasks") or [""]}
+    task = sentences.pop() if len(sentences) == 1 else ""
+    return origin | {"task": task, "time_limit": _time_limit(recorded)}
 
 
 def hand_of(config: SessionConfig) -> str:
