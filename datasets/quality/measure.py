@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from handrail.controllers.errors import restated
+from handrail.controllers.errors import message_of, restated
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.episode_set import EpisodeSet, frames_of
 from handrail.datasets.quality.metric import Metric
@@ -154,11 +154,14 @@ def _of_dataset(metric: Metric, label: str, scope: str, group: EpisodeSet, rng: 
     """Return the mean over the frames, and that of each episode, NaN where it has none."""
     count, ask = len(group.episodes), partial(mean_value, metric, label, rng=None, scope=scope)
     try:
-        values = metric.measure(group, rng)
+        values = np.asarray(metric.measure(group, rng), float)
+        known, owner = np.isfinite(values), group.owner
+        counts = np.bincount(owner[known], minlength=count)
+        sums = np.bincount(owner[known], weights=values[known], minlength=count)
     except DoesNotApply as error:
         return ask(np.full(count, np.nan), reason=str(error))
-    known, owner = np.isfinite(values), group.owner
-    counts = np.bincount(owner[known], minlength=count)
-    sums = np.bincount(owner[known], weights=values[known], minlength=count)
+    except Exception as error:  # whatever another package's code raises; the other metrics go on
+        where = f"{metric.measure.__module__}:{metric.name}"
+        return ask(np.full(count, np.nan), reason=f"{where} failed: {message_of(error)}")
     means = np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0)
     return replace(ask(means), estimate=float(values[known].mean()) if known.any() else None)

@@ -1,6 +1,7 @@
 """Laws of what installed packages bring: broken, it is left out with a warning, or is one line."""
 
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -15,6 +16,7 @@ from handrail.collect.session.build import build_env, build_modes
 from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import fitting
+from handrail.datasets.quality.consistency import state_coverage
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.reading.load import some_recorded
@@ -97,3 +99,19 @@ def test_a_metric_without_a_number_is_one_line(tmp_path, answer, why):
     episodes = some_recorded(record(tmp_path / "dataset", 2))
     with pytest.raises(HandrailError, match=f"^metric heat of episode 0: .*{why}.*$"):
         measure({"": episodes}, np.random.default_rng(0), metrics=[heat])
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [(lambda: 1 / 0, "division by zero"), (lambda: None, ""), (lambda: np.ones(3), "index")],
+)
+def test_a_metric_of_a_dataset_that_fails_says_so_and_the_others_go_on(tmp_path, answer, why):
+    @metric("s", "lower", of_dataset=True)
+    def heat(dataset, rng):
+        return answer()
+
+    episodes = some_recorded(record(tmp_path / "dataset", 2))
+    values = measure({"": episodes}, np.random.default_rng(0), metrics=[heat, state_coverage]).values
+    assert values["heat"][""].estimate is None
+    assert re.match(f"{__name__}:heat failed: .*{why}", values["heat"][""].reason)
+    assert values["state_coverage"][""].estimate is not None
