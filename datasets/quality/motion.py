@@ -11,6 +11,7 @@ from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 WINDOW = 0.5  # [s]
 FLOOR = 0.005  # net motion below which nothing moves: 5 mm where the motion is in metres
 SHARE = 0.2  # of the 95th percentile
+_TREMBLE = 0.01  # of a gripper's greatest opening
 _LOW, _HIGH = 0.25, 0.75  # of the gripper's range: where it counts as closed and as open again
 _STILL = 1e-9  # a path shorter than this is no path, in the unit of the motion
 
@@ -114,10 +115,11 @@ def phase_boundaries(episode: Demonstration) -> IntArray:
 def gripper_state(opening: FloatArray) -> IntArray:
     """Return 1 where the gripper is open and 0 where closed, `(N,)`.
 
-    Open from 75 % of the range it has in the episode, closed from 25 %, in between as before.
+    Open from 75 % of the range it has in the episode, closed from 25 %, in between as before. One that only
+    trembles, by 0.005 or 1 % of its greatest opening, does neither.
     """
     low, high = opening.min(), opening.max()
-    if high - low <= _STILL:
+    if high - low <= max(FLOOR, _TREMBLE * np.abs(opening).max()):
         return np.zeros(len(opening), int)
     share = (opening - low) / (high - low)
     sure = np.where(share >= _HIGH, 1, np.where(share <= _LOW, 0, -1))

@@ -13,6 +13,7 @@ from handrail.datasets.quality.metrics import (
     rate_of_change,
     sparc,
 )
+from handrail.datasets.quality.motion import gripper_state
 
 BELL = np.exp(-5 * np.arange(-1, 1, 0.01) ** 2)
 
@@ -103,3 +104,11 @@ def test_columns_that_are_no_command_have_no_chattering(command):
 def test_smoothness_does_not_hang_on_the_frame_rate(fs):
     time = np.arange(0, 1, 1 / (4 * fs))
     assert sparc(30 * time**2 - 60 * time**3 + 30 * time**4, fs) == pytest.approx(-1.41, abs=0.05)
+
+
+@pytest.mark.parametrize("scale", [1.0, 100.0])  # of an opening in percent, as LeRobot's
+def test_a_gripper_that_trembles_does_not_open_or_close(scale):
+    noise = np.random.default_rng(0).uniform(-1e-3, 1e-3, 300)
+    held, closing = np.full(300, 0.6), np.where(np.arange(300) < 100, 0.9, 0.1)
+    assert not np.diff(gripper_state(scale * (held + noise))).any()
+    assert np.flatnonzero(np.diff(gripper_state(scale * (closing + noise)))).tolist() == [99]
