@@ -165,9 +165,9 @@ def _reason_against(mode: TeleopMode, model: RobotModel) -> str:
     if missing := ", ".join(group for group in owned if not channels.have(group)):
         return f"expected a robot with channels {missing}, got {robot.name}"
     with restated(f"mode {mode.name}", HandrailError):
-        controller = CONTROLLERS.find(mode.controller)
-        resolved(controller.build)
-    return "" if controller.fits(robot) else f"its controller cannot drive {robot.name}"
+        spec = CONTROLLERS.find(mode.controller)
+        resolved(spec.build)
+    return "" if spec.fits(robot) else f"its controller cannot drive {robot.name}: {spec.help}"
 
 
 def session_features(env: HandrailEnv, shared: bool = False) -> dict[str, Feature]:

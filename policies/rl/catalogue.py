@@ -2,16 +2,24 @@
 
 from handrail.collect.operators.modes import TeleopMode, always
 from handrail.controllers.baselines.catalogue import ControllerSpec
+from handrail.controllers.robot.description import RobotDescription, load_description
 
-JOINTS = ("x", "y", "theta") + tuple(
-    f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
-)
-"""Of the robot that the actor was trained on: a Ridgeback with a UR10."""
+ROBOT = "ridgeback_ur10"
+"""The robot that the actor was trained on."""
+
+
+def has_its_arm(robot: RobotDescription) -> bool:
+    """Return whether a robot has the joints and arm of `ROBOT`; a UR5 has joints of the same names."""
+    known = load_description(ROBOT)
+    links = ([arm.urdf.read_bytes() for arm in each.arms] for each in (known, robot))
+    return robot.joints == known.joints and next(links) == next(links)
+
+
 CONTROLLER = ControllerSpec(
     "rl",
     "handrail.policies.rl.controller:RlController",
-    "a base learned by reinforcement, damped least squares on the arm",
-    fits=lambda robot: tuple(robot.joints) == JOINTS,
+    f"a base learned by reinforcement with {ROBOT}, damped least squares on the arm",
+    fits=has_its_arm,
     aims=True,
 )
 MODE = TeleopMode(

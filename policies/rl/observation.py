@@ -8,7 +8,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
-from handrail.policies.rl.catalogue import CONTROLLER, JOINTS
+from handrail.policies.rl.catalogue import CONTROLLER, ROBOT
 
 OBSERVATION_SIZE = 54
 ACTION_SIZE = 3
@@ -20,8 +20,8 @@ RigidPose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3)
 def check_robot(model: RobotModel) -> None:
     """Check that a robot is of the kind that the actor was trained on."""
     if not CONTROLLER.fits(model.description):
-        words = f"expected the joints {', '.join(JOINTS)}, got {', '.join(model.joints)}"
-        raise HandrailError(f"robot {model.description.name} of the learnt baseline: {words}")
+        name = model.description.name
+        raise HandrailError(f"robot {name} of the learnt baseline: expected the joints and arm of {ROBOT}")
 
 
 def observe(

@@ -105,7 +105,7 @@ def test_a_command_of_another_size_is_refused_in_one_line(change, got):
 @pytest.mark.parametrize(
     ("mode", "told"),
     [
-        ("ARM", "its controller cannot drive ridgeback_ur10"),
+        ("ARM", "its controller cannot drive ridgeback_ur10: of a table"),
         ("WAND", "expected the package no_such_wand, found none; install it"),
     ],
 )

@@ -6,10 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from collect_helpers import write_small_robot
 from rl_helpers import random_actor
 
+from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
-from handrail.collect.session.build import build_controller
+from handrail.collect.session.build import build_controller, build_mode
 from handrail.collect.session.loop import Aiming
 from handrail.collect.world.ideal_robot import IdealRobot
 from handrail.collect.world.plant import Gate
@@ -72,10 +74,23 @@ def test_as_many_joints_of_another_robot_are_refused():
     other = SimpleNamespace(joints=joints, description=SimpleNamespace(joints=joints, name="other"))
     assert CONTROLLERS["rl"].fits(MODEL.description)
     assert not CONTROLLERS["rl"].fits(other.description)
-    with pytest.raises(
-        HandrailError, match="robot other of the learnt baseline: expected the joints x, y, theta, "
-    ):
+    with pytest.raises(HandrailError, match=r"robot other .*: expected the joints and arm of ridgeback_ur10"):
         check_robot(other)  # type: ignore[arg-type]
+
+
+def test_another_arm_with_joints_of_the_same_names_is_refused(tmp_path):
+    """A UR5 on a planar base moves otherwise; other limits or a robot's other name are no other arm."""
+    small = load_model(write_small_robot(tmp_path))
+    assert small.joints == MODEL.joints
+    with pytest.raises(
+        HandrailError, match=r"robot small_ur5 .*: expected the joints and arm of ridgeback_ur10"
+    ):
+        check_robot(small)
+    said = "its controller cannot drive small_ur5: .* with ridgeback_ur10"
+    with pytest.raises(HandrailError, match=said):
+        build_mode(SessionConfig(robot=str(tmp_path / "small_ur5.toml"), mode="rl"), small)
+    mine = replace(MODEL.description, name="mine", limits=small.description.limits)
+    assert CONTROLLERS["rl"].fits(mine)
 
 
 @pytest.mark.parametrize(

@@ -201,5 +201,5 @@ def test_a_robot_without_a_base_is_refused(tmp_path):
     text = re.sub(r"^(\w+ = \[)(\S+, ){3}(?=(\S+, ){5}\S+\]$)", r"\1", text, flags=re.MULTILINE)
     path = tmp_path / "fixed.toml"
     path.write_text(text)
-    with pytest.raises(HandrailError, match="expected the joints x, y, theta, shoulder_pan_joint"):
+    with pytest.raises(HandrailError, match="expected the joints and arm of ridgeback_ur10"):
         check_robot(load_model(path))
