@@ -56,6 +56,5 @@ def check_file(flag: str, file: str, ending: str = "") -> None:
         return
     path = Path(file).expanduser().absolute()
     if not file.endswith(ending) or path.is_dir() or not path.parent.is_dir():
-        kind = f"{ending} file" if ending else "file"
-        raise HandrailError(f"{flag} {file}: expected a {kind} in an existing folder")
+        raise HandrailError(f"{flag} {file}: expected a {f'{ending} file'.strip()} in an existing folder")
     check_room(f"{flag} {file}", path.parent)

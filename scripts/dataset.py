@@ -28,8 +28,7 @@ def inspect(config: InspectConfig) -> int:
         metric = ranking_metric(config.worst)
         worst = worst_episodes(root, metric, config.count)
         console.print(worst_table(root, metric, worst))
-        leave_out = deletion(read_info(root), [each.episode.number for each in worst])
-        console.print(f"Without them: {leave_out}")
+        console.print(f"Without them: {deletion(read_info(root), [each.episode.number for each in worst])}")
         return 0
     console.print(summary_table(root))
     if taken := takeover_table(root):
@@ -93,8 +92,7 @@ def push(config: PushConfig) -> None:
     if advice := packing_advice(dataset.folder):
         say(advice)
     if config.upload:
-        send = copy if config.to else upload
-        send(push)
+        (copy if config.to else upload)(push)
         say(f"sent to {config.to}" if config.to else f"sent as {push.repo_id}")
     else:
         say("nothing was sent; --upload sends it")

@@ -14,8 +14,6 @@ from pathlib import Path
 
 import fsspec
 import numpy as np
-from fsspec.implementations.local import LocalFileSystem
-from fsspec.spec import AbstractFileSystem
 from huggingface_hub import HfApi
 
 from handrail.controllers.errors import HandrailError, message_of, restated
@@ -136,7 +134,7 @@ def upload(push: Upload) -> None:
         raise HandrailError(f"--upload: the hub did not take {push.repo_id}: {message_of(error)}") from error
 
 
-def free_place(to: str, sent: Collection[str] = ()) -> tuple[AbstractFileSystem, str]:
+def free_place(to: str, sent: Collection[str] = ()) -> tuple[fsspec.AbstractFileSystem, str]:
     """Return the store that an address names, and the place in it, once a dataset may be copied there.
 
     Args:
@@ -149,7 +147,7 @@ def free_place(to: str, sent: Collection[str] = ()) -> tuple[AbstractFileSystem,
         system.invalidate_cache()
         found = system.find(place) if system.exists(place) else []
     names = {path.removeprefix(f"{place}/") for path in found}
-    if isinstance(system, LocalFileSystem):
+    if to.startswith(("file://", "local://")):
         check_room(f"--to {to}", Path(place))
     if _LAST in names or (sent and not names <= set(sent)):
         raise HandrailError(

@@ -158,10 +158,9 @@ def _of_dataset(metric: Metric, label: str, scope: str, group: EpisodeSet, rng: 
         known, owner = np.isfinite(values), group.owner
         counts = np.bincount(owner[known], minlength=count)
         sums = np.bincount(owner[known], weights=values[known], minlength=count)
-    except DoesNotApply as error:
-        return ask(np.full(count, np.nan), reason=str(error))
-    except Exception as error:  # whatever another package's code raises; the other metrics go on
-        where = f"{metric.measure.__module__}:{metric.name}"
-        return ask(np.full(count, np.nan), reason=f"{where} failed: {message_of(error)}")
+    except Exception as error:  # also whatever another package's code raises; the other metrics go on
+        failed = f"{metric.measure.__module__}:{metric.name} failed: {message_of(error)}"
+        reason = str(error) if isinstance(error, DoesNotApply) else failed
+        return ask(np.full(count, np.nan), reason=reason)
     means = np.divide(sums, counts, out=np.full(count, np.nan), where=counts > 0)
     return replace(ask(means), estimate=float(values[known].mean()) if known.any() else None)

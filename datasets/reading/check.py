@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -19,7 +18,7 @@ from handrail.datasets.format.episode_rows import ForeignRowError
 from handrail.datasets.format.info_file import read_encodings, summary_files
 from handrail.datasets.format.layout import FOLDERS, Layout
 from handrail.datasets.format.manifest import read_manifest
-from handrail.datasets.format.schema import AUTOMATIC, features_of, video_keys
+from handrail.datasets.format.schema import AUTOMATIC, video_keys
 from handrail.datasets.format.tables import UNREADABLE
 from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo, open_dataset, read_episodes, read_info
@@ -39,23 +38,22 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
         verify: Read every byte anew.
     """
     info, found = _surveyed(root, verify)
+    where = f"dataset {str(info.root)!r}"
     if found is not None:
         found.require_whole()
         repair = f"handrail-edit repair {shlex.quote(str(info.root))}"
         manifest = read_manifest(found.layout)
         recorded = {key: feature for key, feature in info.features.items() if key not in AUTOMATIC}
         said = replace(manifest, fps=info.fps, robot_type=info.robot_type, features=recorded)
-        said.check_fits(
-            manifest, f"dataset {str(info.root)!r}: meta/info.json was changed; {repair} writes it anew"
-        )
+        said.check_fits(manifest, f"{where}: meta/info.json was changed; {repair} writes it anew")
         if stray := [found.layout.relative(each) for each in found.unknown if each.suffix == ".parquet"]:
             raise HandrailError(
-                f"dataset {str(info.root)!r}: LeRobot reads files of no episode, {shortened(stray, ', ')};"
+                f"{where}: LeRobot reads files of no episode, {shortened(stray, ', ')};"
                 f" {repair} moves them to .damaged"
             )
     if missing := _missing(info):
         raise HandrailError(
-            f"dataset {str(info.root)!r} was copied in part: {len(missing)} files are missing"
+            f"{where} was copied in part: {len(missing)} files are missing"
             f" ({shortened(missing, ', ')}); copy it again"
         )
 
@@ -123,23 +121,18 @@ def _summary_faults(layout: Layout, found: Survey | None, advice: str) -> Iterat
 
 
 def _content(path: Path, data: bytes) -> dict[str, Any]:
-    """Return what a summary file says, by names; of the tasks, their numbers by their sentences."""
+    """Return what a summary file says, by names: of JSON those in it, of a table those of its columns."""
     if path.suffix == ".parquet":
-        columns = pq.read_table(pa.BufferReader(data)).to_pydict()
-        places = columns.pop("task_index")
-        (sentences,) = columns.values()
-        return dict(zip(sentences, places, strict=True))
-    content = msgspec.convert(parse_json(data), dict[str, Any])
-    described = path.name == "info.json"
-    return content | {"features": features_of(content["features"])} if described else content
+        return pq.read_table(pa.BufferReader(data)).to_pydict()
+    return dict(parse_json(data))
 
 
 def _alike(said: Any, right: Any) -> bool:
     """Return whether a value of a summary file is the right one, but for rounding."""
-    if isinstance(right, dict):
-        return isinstance(said, dict) and all(_alike(said.get(key), each) for key, each in right.items())
-    if isinstance(right, list):
-        return isinstance(said, list) and len(said) == len(right) and all(map(_alike, said, right))
+    if isinstance(right, dict) and isinstance(said, dict):
+        return said.keys() == right.keys() and all(_alike(said[key], right[key]) for key in right)
+    if isinstance(right, list) and isinstance(said, list):
+        return len(said) == len(right) and all(map(_alike, said, right))
     if isinstance(right, float) and isinstance(said, float | int):
         return math.isclose(said, right, rel_tol=_ROUNDING, abs_tol=_ROUNDING)
     return said == right

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 from msgspec import Meta
 
-from handrail.collect.config import MOST_TIME, check_fps
+from handrail.collect.config import FPS_RANGE, MOST_TIME, check_fps
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_file, check_names, names, one_of, only_one
 from handrail.collect.seeds import MOST_ROLLOUTS, evaluation_seed
@@ -86,8 +86,7 @@ class EvaluateConfig(ExecutionConfig):
         self.check_execution()
         if self.task:
             TASKS.check(self.task)
-        if self.fps:
-            check_fps(self.fps, "--fps")
+        check_fps(self.fps or FPS_RANGE[0], "--fps")
         check_names("protection", "--protection", self.protections, PROTECTIONS)
         if not self.perturbations or len(set(self.perturbations)) != len(self.perturbations):
             raise HandrailError(f"--perturbation {self.perturbation}: expected one or more, each once")

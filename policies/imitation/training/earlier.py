@@ -28,8 +28,7 @@ def earlier_policy(config: TrainConfig) -> tuple[Path, PolicyMeta]:
 def same_interface(init: str, earlier: PolicyMeta, interface: PolicyInterface) -> PolicyInterface:
     """Return the interface of the policy that a training begins with, once it is the dataset's.
 
-    It may have more masks than the dataset, none fewer: what nobody owns is no mask to learn. It keeps its
-    view of the velocities of obstacles.
+    It may have more masks than the dataset, none fewer: what nobody owns is no mask to learn.
     """
     known = earlier.interface
     assert known is not None
@@ -40,4 +39,4 @@ def same_interface(init: str, earlier: PolicyMeta, interface: PolicyInterface) -
     if new := [mask for mask in interface.masks if any(mask) and mask not in known.masks]:
         names = [name for name, owned in zip(interface.channels, new[0], strict=True) if owned]
         raise HandrailError(f"{refused} masks; it has none of {', '.join(names)}")
-    return replace(interface, masks=known.masks, turned_velocities=known.turned_velocities)
+    return replace(interface, masks=known.masks)

@@ -152,9 +152,8 @@ def read_source(
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
     else:
-        interface, features, columns = _interpreted(
-            info, selection, config, config.actions, encoder, earlier, began
-        )
+        known = earlier or began
+        interface, features, columns = _interpreted(info, selection, config, config.actions, encoder, known)
     if config.images:
         if not (cameras := pictured(info)):
             raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
@@ -192,8 +191,7 @@ def _interpreted(
     config: TrainConfig,
     actions: Literal["realised", "intent"],
     encoder: Encoder | None,
-    earlier: PolicyMeta | None,
-    began: PolicyMeta | None,
+    known: PolicyMeta | None,
 ) -> tuple[PolicyInterface, Features, Columns]:
     """Return what a policy learns through an interface."""
     if actions == "intent":
@@ -207,10 +205,10 @@ def _interpreted(
         raise HandrailError(f"--actions {actions}: expected the columns of handrail-record, {words}")
     masks = _episodes(info, selection, [MASK])
     interface = PolicyInterface.of_dataset(features, masks, actions, config.base_pose)
-    if earlier:
-        interface = same_interface(config.init, earlier, interface)
-    if began and began.interface:  # it goes on with the view that it has
-        interface = replace(interface, turned_velocities=began.interface.turned_velocities)
+    if known and config.init:
+        interface = same_interface(config.init, known, interface)
+    if known and known.interface:  # it goes on with the view that it has
+        interface = replace(interface, turned_velocities=known.interface.turned_velocities)
 
     def learnt(episode: Columns) -> Columns:
         state, environment = interface.observe(episode[STATE], episode[ENVIRONMENT])
