@@ -23,7 +23,7 @@ ROWS = np.full((8, 7), 0.1)
 class Plans:
     """A policy that wants the same all the time, and has planned some rows."""
 
-    encoder = None
+    encoder: Any = None
 
     def __init__(self):
         self.rows, self.asked = ROWS, 0
