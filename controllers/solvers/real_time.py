@@ -15,7 +15,7 @@ from handrail.controllers.ocp.residuals import StageResiduals
 
 NOTHING_ACTIVE = np.arange(SLACKS)  # only the slacks are at rest: none is negative
 _PHASES = ("distances", "residuals", "solve")
-_WORK = 2e5  # of all QPs of an update for each variable, counted as core/active_set.c does
+WORK = 2e5  # of all QPs of an update for each variable, counted as core/active_set.c does
 _ROUNDING = 2e-5  # of a joint's range, that the QP leaves
 
 
@@ -49,7 +49,7 @@ class RealTimeSolver:
         """
         core = self._asked(problem, guess)
         core.active[: len(active)] = active
-        core.fields.active_rows, core.fields.work = len(active), _WORK * core.fields.M
+        core.fields.active_rows, core.fields.work = len(active), WORK * core.fields.M
         functions().solve_update(core, problem.collision.memory)
         problem.collision.check()
         slacks, half = core.slacks.tolist(), core.joint_scale[0]

@@ -270,7 +270,7 @@ def test_closed_loops_from_200_random_states_follow_the_converged_solution():
 def test_where_the_work_ends_the_plan_says_by_how_much_it_falls_short(work, monkeypatch):
     """Law: the slack is that of the plan's distances, not of the rows that the solver had come to."""
     rng, mpc = np.random.default_rng(0), MaskedMpc(load_model())
-    monkeypatch.setattr(real_time, "_WORK", work)
+    monkeypatch.setattr(real_time, "WORK", work)
     toward, tool = np.eye(mpc.channels.size)[3], mpc.model.pose(DESCRIPTION.home).position
     for _ in range(4):
         places = tool + [0.45, 0.0, 0.0] + rng.uniform(-0.25, 0.25, (4, 3))

@@ -6,7 +6,7 @@ from collect_helpers import UP, action, environment, hold, moved, over_cube, rea
 
 from handrail.collect.world.scene import Scene, SceneObject, box
 from handrail.collect.world.task import Start
-from handrail.collect.world.tasks import furniture
+from handrail.collect.world.tasks import obstacles
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.pick_place import PickPlace
 from handrail.controllers.errors import HandrailError
@@ -168,6 +168,6 @@ def test_a_scene_refuses_two_things_of_one_name():
 
 
 def test_no_room_for_obstacles_is_an_error(monkeypatch):
-    monkeypatch.setattr(furniture, "CLEARANCE", 3.0)
+    monkeypatch.setattr(obstacles, "CLEARANCE", 3.0)
     with pytest.raises(HandrailError, match="no room for"):
         PickPlace().sample(load_model(), np.random.default_rng(0))

@@ -47,7 +47,7 @@ def shared(policy) -> Any:
         observe=lambda state, environment: (state, environment),
         decode=lambda action, state: Intent(DRIVES.values * action[0] / 0.1, DRIVES.mask),
     )
-    checkpoint = SimpleNamespace(meta=SimpleNamespace(mode="base+ee", interface=interface))
+    checkpoint = SimpleNamespace(meta=SimpleNamespace(mode="base+ee", task="", interface=interface))
     env = SimpleNamespace(model=ONE, task=SimpleNamespace(description=""))
     operator = PolicyOperator(policy, checkpoint, env, PERIOD)  # pyright: ignore[reportArgumentType]
     made = SharedOperator(Fake(asks()), operator, arbiter("by_mask"), ONE)
