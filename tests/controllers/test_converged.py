@@ -161,7 +161,9 @@ def no_garbage_collection():
     gc.enable()
 
 
+@pytest.mark.slow  # under load an interrupted CasADi can keep the process from ending
 @pytest.mark.filterwarnings("ignore:.*KeyboardInterruptException")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # what was cut short
 @pytest.mark.usefixtures("no_garbage_collection")
 def test_an_interrupt_is_heard_though_casadi_takes_it(capfd):
     """Law: SIGTERM at any moment of a solution ends it; CasADi makes a warning of it, and goes on."""
