@@ -7,7 +7,7 @@ short before that, nothing has changed; after it, `settle` finishes what is left
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
@@ -81,18 +81,17 @@ def drafted(root: Path, replacing: bool = False) -> Iterator[Layout]:
         OSError: The disk does not take it, or somebody else has taken the name meanwhile.
     """
     draft = Layout(_draft(root))
-    with FolderLock(draft.staging) as lock:
+    with _locked(draft) as lock:
         if (old := beside(root, "replaced")).exists():
             raise HeldError(f"{str(old)!r} is still there: another edit is at work, or could not remove it")
         try:
-            for path in set(draft.root.iterdir()) - {draft.staging}:  # of a writing that was cut short
-                remove(path)
+            _clear(draft)  # of a writing that was cut short
             yield draft
             clear_staging(draft)
             publish_folder(draft.root, root, replacing)
         except BaseException:
             if is_dataset(Layout(root)) or not replacing:  # else it has no name, and `settle` goes on
-                remove(draft.root)
+                _clear(draft)
             raise
         lock.moved(Layout(root).staging)
 
@@ -115,16 +114,41 @@ def settle(root: Path) -> bool:
     old, draft, dataset = beside(root, "replaced"), Layout(_draft(root)), Layout(root)
     if not (old.exists() or draft.root.exists()):  # as `publish_folder` calls them
         return False
-    with FolderLock(draft.staging) as lock:
-        finished = old.exists()
-        if not is_dataset(dataset) and is_dataset(Layout(old)):  # cut short between its two names
-            os.replace(draft.root if is_dataset(draft) else old, root)
-            lock.moved(dataset.staging)
+    with _locked(draft) as lock:
+        finished = is_dataset(Layout(old))
+        if finished and not is_dataset(dataset):  # cut short between its two names
+            if is_dataset(draft):
+                os.replace(draft.root, root)
+                lock.moved(dataset.staging)
+            else:
+                os.replace(old, root)
             sync(root.parent)
         if is_dataset(dataset):
             shutil.rmtree(old, ignore_errors=True)
-        remove(draft.root)
+        _clear(draft)
     return finished and not old.exists()
+
+
+@contextmanager
+def _locked(draft: Layout) -> Iterator[FolderLock]:
+    """Hold the lock of a draft, whose folder goes afterwards if it is empty.
+
+    Not before: NFS keeps an open file, such as the lock, under another name until it is closed.
+    """
+    try:
+        with FolderLock(draft.staging) as lock:
+            yield lock
+    finally:
+        with suppress(OSError):
+            draft.root.rmdir()
+
+
+def _clear(draft: Layout) -> None:
+    """Remove all but the lock of a draft, which may have got its name."""
+    if draft.root.exists():
+        clear_staging(draft)
+        for path in set(draft.root.iterdir()) - {draft.staging}:
+            remove(path)
 
 
 def _copy_beside(root: Path, target: Path) -> None:

@@ -44,10 +44,12 @@ class FolderLock:
             return
         file, self._file = self._file, None
         with file:
-            if self._is_current(file):  # else the folder was replaced, and what is there is somebody else's
+            mine = self._is_current(file)  # else the folder was replaced, and what is there is somebody else's
+            if mine:
                 self._path.unlink()
-                with contextlib.suppress(OSError):  # not empty: worth a look
-                    self._path.parent.rmdir()
+        if mine:
+            with contextlib.suppress(OSError):  # not empty: worth a look; NFS keeps it until it is closed
+                self._path.parent.rmdir()
 
     def moved(self, staging: Path) -> None:
         """Take note of where the locked staging folder is since its dataset was renamed."""

@@ -1,12 +1,14 @@
 """A merge that fails or is killed changes nothing, or has done it all."""
 
+import errno
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 from command_helpers import ran, refused
 from datasets_guillotine import Guillotine
-from datasets_helpers import TINY_FEATURES, record, tree
+from datasets_helpers import TINY_FEATURES, record, resume, tree
 from editing_helpers import content, part
 
 from handrail.controllers.errors import HandrailError
@@ -14,8 +16,9 @@ from handrail.datasets.editing.config import SplitConfig
 from handrail.datasets.editing.edit import edit
 from handrail.datasets.editing.merge import drop_episodes, merge_datasets
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.reading.check import check_report
 from handrail.datasets.recording.repair import repair
-from handrail.datasets.recording.rewrite import settle
+from handrail.datasets.recording.rewrite import drafted, settle
 from handrail.scripts import cli
 
 GUILLOTINE = Guillotine()
@@ -101,3 +104,41 @@ def test_a_merge_of_a_folder_with_itself_or_into_one_of_its_own_asks(tmp_path):
         assert tree(tmp_path) == before
     ran(root, other, "--output", root, "--in_place", name="edit merge")
     assert len(content(root)) == 4
+
+
+def test_edits_where_an_open_file_keeps_a_name_until_it_is_closed(tmp_path, monkeypatch):
+    """NFS does that, so that the folder of a lock that is held cannot be removed."""
+    root, (rmtree, unlink, rmdir) = record(tmp_path / "set", 2), (shutil.rmtree, Path.unlink, Path.rmdir)
+
+    def clear(folder):
+        held = {os.path.realpath(f"/proc/self/fd/{each}") for each in os.listdir("/proc/self/fd")}
+        for hidden in set(folder.rglob(".nfs*")) - {Path(each) for each in held}:
+            unlink(hidden)
+        return held
+
+    def removed(path, **how):
+        held = str(path) in clear(path.parent)
+        return path.rename(path.with_name(f".nfs_{path.name}")) if held else unlink(path, **how)
+
+    def emptied(folder, ignore_errors=False):
+        for path in folder.rglob("*"):
+            if path.is_file() and not path.name.startswith(".nfs"):
+                removed(path)
+        clear(folder)
+        if not any(folder.rglob(".nfs*")):
+            rmtree(folder)
+        elif not ignore_errors:
+            raise OSError(errno.ENOTEMPTY, "Directory not empty", str(folder))
+
+    monkeypatch.setattr(shutil, "rmtree", emptied)
+    monkeypatch.setattr(Path, "unlink", removed)
+    monkeypatch.setattr(Path, "rmdir", lambda path: (clear(path), rmdir(path)))
+    for reason in "once", "again", "and again":
+        labels = "--label", "failure", "--reason", reason
+        ran(root, "--episodes", 0, *labels, "--in_place", name="edit relabel")
+    with resume(root):
+        pass
+    with pytest.raises(HandrailError, match="no episode"), drafted(root, True):
+        raise HandrailError("no episode")
+    assert not check_report(root)
+    assert sorted(os.listdir(tmp_path)) == ["set"]
