@@ -17,7 +17,7 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import ColumnTypes
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import shared_features
-from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
+from handrail.datasets.recording.rewrite import left_of, rename_away, settle, write_anew
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import explained, followed
 from handrail.datasets.storage.lock import FolderLock
@@ -37,7 +37,8 @@ class Edited:
     """Number of frames of the datasets that it came from."""
 
     def __str__(self) -> str:
-        return f"{self.root}: {self.episodes} episodes, {self.frames} frames (of {self.before})"
+        words = f"{self.root}: {self.episodes} episodes, {self.frames} frames (of {self.before})"
+        return "; ".join(filter(None, (words, left_of(self.root))))
 
 
 def copy_episodes(
@@ -100,26 +101,37 @@ def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]
         dropped: Says by an episode's row of metadata whether it goes.
     """
     root = followed(root)
-    with explained(f"cannot write {str(root)!r}"):
-        settle(root)  # what was cut short is done; dropping the same again does no harm
-        if _is_empty(root):
+    count, cannot = 0, f"cannot write {str(root)!r}"
+    with explained(cannot):
+        _settle_all(root)  # what was cut short is done; dropping the same again does no harm
+        if empty := _is_empty(root):
             with FolderLock(Layout(root).staging):
                 check_none_set_aside(Layout(root))
-                remove_whole(root)  # files of a first episode that was cut short may lie there
-            return 0
-    with opened([root], root, verify=True) as (source,):
-        kept = [row["episode_index"] for row in source.rows if not dropped(row)]
-        if 0 < len(kept) < len(source.rows):
-            copy_episodes([source], root, source.slices(kept), in_place=True)
-        elif not kept:
-            remove_whole(root)
-        return len(source.rows) - len(kept)
+                rename_away(root)  # files of a first episode that was cut short may lie there
+    if not empty:
+        with opened([root], root, verify=True) as (source,):
+            kept = [row["episode_index"] for row in source.rows if not dropped(row)]
+            count = len(source.rows) - len(kept)
+            if kept and count:
+                copy_episodes([source], root, source.slices(kept), in_place=True)
+            elif not kept:
+                rename_away(root)
+    with explained(cannot):
+        _settle_all(root)
+    return count
 
 
 def _with(shared: Mapping[str, Feature], manifest: Manifest) -> Manifest:
     """Return a schema with those shared columns that it lacks."""
     lacking = {name: each for name, each in shared.items() if name not in manifest.features}
     return replace(manifest, features={**manifest.features, **lacking})
+
+
+def _settle_all(root: Path) -> None:
+    """Finish a writing anew that was cut short, and check that it left no episode."""
+    settle(root)
+    if left := left_of(root):
+        raise HandrailError(f"{left}, then do it again")
 
 
 def _is_empty(root: Path) -> bool:

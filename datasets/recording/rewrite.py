@@ -96,12 +96,19 @@ def drafted(root: Path, replacing: bool = False) -> Iterator[Layout]:
         lock.moved(Layout(root).staging)
 
 
-def remove_whole(root: Path) -> None:
-    """Remove a dataset, at once: cut short, `settle` goes on."""
+def rename_away(root: Path) -> None:
+    """Take a dataset's name from it, at once; `settle` removes it, once its lock is free."""
     remove(_draft(root))
     os.replace(root, _draft(root))
     sync(root.parent)
-    remove(_draft(root))
+
+
+def left_of(root: Path) -> str:
+    """Return what to do where files of the dataset that one of this name has replaced are left; else ""."""
+    old = beside(root, "replaced")
+    if any(path.is_file() for folder in FOLDERS for path in (old / folder).rglob("*")):
+        return f"{str(old)!r} could not be removed and holds what was there: remove it"
+    return ""
 
 
 def settle(root: Path) -> bool:

@@ -175,3 +175,15 @@ def check_is(root: Path, originals: Iterable[int]) -> None:
         assert frames["index"].tolist() == list(range(start, start + length_of(number)))
         assert set(frames["episode_index"]) == {place}
         start += length_of(number)
+
+
+def keep_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refuse to remove the files of episodes where a whole folder is removed."""
+    real = os.unlink
+
+    def unlink(path, **options):
+        if str(path).startswith("file-") and "dir_fd" in options:
+            raise PermissionError(13, "Permission denied")
+        real(path, **options)
+
+    monkeypatch.setattr(os, "unlink", unlink)

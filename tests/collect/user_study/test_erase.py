@@ -7,6 +7,7 @@ import shutil
 
 import pytest
 from datasets_guillotine import Guillotine
+from datasets_helpers import keep_files
 from user_study_helpers import erased, session, study_folder, table, trials, wanted
 
 from handrail.collect.user_study.exports import COLUMNS
@@ -132,3 +133,17 @@ def test_tables_without_anybody_have_their_headings(tmp_path):
     erased(folder, "P001")
     for name, columns in COLUMNS.items():
         assert (folder.exports / f"{name}.csv").read_text() == ",".join(columns) + "\n"
+
+
+def test_an_erasure_that_cannot_remove_the_old_files_is_not_done(tmp_path, monkeypatch):
+    folder = study_folder(tmp_path)
+    for name in ("P001", "P002"):
+        session(folder, name)
+    keep_files(monkeypatch)
+    for _ in range(2):
+        with pytest.raises(HandrailError, match=r"\.replaced' could not be removed"):
+            erased(folder, "P001")
+        assert "P001" in folder.participants()
+    monkeypatch.undo()
+    assert "erased P001" in erased(folder, "P001")
+    assert not list(tmp_path.rglob(".*.replaced"))

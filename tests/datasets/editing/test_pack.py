@@ -12,6 +12,7 @@ from command_helpers import command, ran, refused
 from datasets_helpers import (
     CAMERAS,
     check_pictures,
+    keep_files,
     length_of,
     open_with_lerobot,
     record,
@@ -223,7 +224,7 @@ def test_a_folder_that_cannot_be_removed_fails_no_edit(tmp_path, monkeypatch):
 
     (root / "raw").mkdir()
     monkeypatch.setattr(os, "rmdir", rmdir)
-    merge_datasets([root], root)
+    assert "replaced" not in str(merge_datasets([root], root))  # no episode is left there
     assert (tmp_path / ".set.replaced" / "raw").is_dir()
     assert repair(root).clean
     with resume(root) as writer:
@@ -231,6 +232,15 @@ def test_a_folder_that_cannot_be_removed_fails_no_edit(tmp_path, monkeypatch):
     with pytest.raises(HandrailError, match=r"\.set\.replaced' is still there"):
         merge_datasets([root], root)
     monkeypatch.undo()
-    assert settle(root)
+    assert not settle(root)  # no edit was cut short
     merge_datasets([root], root)
     assert len(read_episodes(root)) == 3
+
+
+def test_an_edit_says_what_it_could_not_remove(tmp_path, monkeypatch):
+    root = part(tmp_path / "set", 0, 2)
+    keep_files(monkeypatch)
+    assert ".set.replaced' could not be removed and holds" in str(merge_datasets([root], root))
+    monkeypatch.undo()
+    settle(root)
+    assert "removed" not in str(merge_datasets([root], root))
