@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -18,7 +19,7 @@ from handrail.datasets.format.episode_rows import ForeignRowError
 from handrail.datasets.format.info_file import read_encodings, summary_files
 from handrail.datasets.format.layout import FOLDERS, Layout
 from handrail.datasets.format.manifest import read_manifest
-from handrail.datasets.format.schema import AUTOMATIC, video_keys
+from handrail.datasets.format.schema import AUTOMATIC, features_of, video_keys
 from handrail.datasets.format.tables import UNREADABLE
 from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo, open_dataset, read_episodes, read_info
@@ -72,7 +73,10 @@ def check_report(root: str | Path) -> list[str]:
     layout = Layout(info.root)
     summary = (layout.stats, layout.tasks) if info.episodes else ()
     faults += [f"{path.name}: missing" for path in summary if not path.exists()]
-    return [*faults, *_summary_faults(layout, found, f"; {repair} writes it anew")]
+    said = list(_summary_faults(layout, found, f"; {repair} writes it anew"))
+    if said and read_info(root).episodes != info.episodes:  # somebody has recorded more meanwhile
+        said = []
+    return [*faults, *said]
 
 
 def has_checksums(root: str | Path) -> bool:
@@ -121,10 +125,13 @@ def _summary_faults(layout: Layout, found: Survey | None, advice: str) -> Iterat
 
 
 def _content(path: Path, data: bytes) -> dict[str, Any]:
-    """Return what a summary file says, by names: of JSON those in it, of a table those of its columns."""
+    """Return what a summary file says, by names; of the tasks, their numbers by their sentences."""
     if path.suffix == ".parquet":
-        return pq.read_table(pa.BufferReader(data)).to_pydict()
-    return dict(parse_json(data))
+        tasks = pq.read_table(pa.BufferReader(data)).to_pydict()
+        return dict(zip(tasks["task"], tasks["task_index"], strict=True))
+    content = msgspec.convert(parse_json(data), dict[str, Any])
+    columns = {"features": features_of(content["features"])} if path.name == "info.json" else {}
+    return content | columns  # of a column other tools may say more
 
 
 def _alike(said: Any, right: Any) -> bool:

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shutil
 
 import numpy as np
@@ -20,7 +19,6 @@ from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.format.episode_rows import EpisodeRows
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.metadata import Checksum
-from handrail.datasets.format.tables import tasks_bytes
 from handrail.datasets.reading.check import check_report, check_whole
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording import checksums
@@ -126,77 +124,6 @@ def test_statistics_that_are_no_json_are_noticed(root):
     stats["action"]["max"] = [np.inf, 1.0]
     Layout(root).stats.write_text(json.dumps(stats))
     assert [fault.partition(":")[0] for fault in check_report(root)] == ["meta/stats.json"]
-
-
-@pytest.mark.parametrize("name", ["info.json", "tasks.parquet", "stats.json"])
-def test_a_summary_that_is_not_there_or_of_other_episodes_is_noticed_and_mended(root, name):
-    path = Layout(root).info.with_name(name)
-    whole = path.read_bytes()
-    if name == "info.json":  # as a crash leaves it between an episode and its summary
-        path.write_bytes(whole.replace(b'"total_episodes": 4', b'"total_episodes": 3'))
-    else:
-        path.unlink()
-    assert [fault.partition(":")[0].rpartition("/")[2] for fault in check_report(root)] == [name]
-    repair(root)
-    assert check_report(root) == []
-    assert path.read_bytes() == whole
-
-
-def _said_otherwise(path, change):
-    """Change what a summary file says."""
-    content = json.loads(path.read_bytes())
-    change(content)
-    path.write_text(json.dumps(content))
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        (lambda info: info.update(fps=25), "fps"),
-        (lambda info: info.update(robot_type="panda"), "robot_type"),
-        (lambda info: info["features"].pop("engaged"), "features?"),
-        (lambda info: info["features"]["action"].update(names=["b", "a"]), "features?"),
-    ],
-)
-def test_an_info_file_that_contradicts_the_manifest_is_refused(root, change, named):
-    _said_otherwise(Layout(root).info, change)
-    with pytest.raises(HandrailError, match=rf"\A[^\n]*handrail-edit repair [^\n]*{named}[^\n]*\Z"):
-        check_whole(root)
-    (fault,) = check_report(root)
-    assert re.match(rf"meta/info.json: .* {named}; handrail-edit repair ", fault)
-    repair(root)
-    check_whole(root)
-    assert check_report(root) == []
-
-
-@pytest.mark.parametrize("said", [["drop the cup"], [], ["lift the cup", "drop the cup"]])
-def test_other_tasks_than_the_episodes_have_are_noticed(root, said):
-    Layout(root).tasks.write_bytes(tasks_bytes(said))
-    (fault,) = check_report(root)
-    assert fault.startswith("meta/tasks.parquet: ")
-    repair(root)
-    assert check_report(root) == []
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        (lambda stats: stats["action"].update(mean=[1.0, 2.0]), "action"),
-        (lambda stats: stats.pop("action"), "action"),
-        (lambda stats: stats.update(other=stats["action"]), "other"),
-    ],
-)
-def test_statistics_of_other_rows_are_noticed_but_not_their_rounding(root, change, named):
-    stats = Layout(root).stats
-    _said_otherwise(
-        stats, lambda said: said["action"].update(mean=[x + 1e-9 for x in said["action"]["mean"]])
-    )
-    assert check_report(root) == []
-    _said_otherwise(stats, change)
-    (fault,) = check_report(root)
-    assert fault.startswith(f"meta/stats.json: not what the episodes say of {named}; handrail-edit repair ")
-    repair(root)
-    assert check_report(root) == []
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
