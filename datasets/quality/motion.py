@@ -11,7 +11,7 @@ from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 WINDOW = 0.5  # [s]
 FLOOR = 0.005  # net motion below which nothing moves: 5 mm where the motion is in metres
 SHARE = 0.2  # of the 95th percentile
-_TREMBLE = 0.01  # of a gripper's greatest opening
+_TREMBLE = 0.01  # of the widest opening of a gripper in the datasets
 _LOW, _HIGH = 0.25, 0.75  # of the gripper's range: where it counts as closed and as open again
 _STILL = 1e-9  # a path shorter than this is no path, in the unit of the motion
 
@@ -37,7 +37,7 @@ def ldlj(episode: Demonstration, scale: Scale) -> float:
 @metric("", "higher", "motion")
 def path_efficiency(episode: Demonstration, scale: Scale) -> float:
     """Straight-line over travelled distance, each phase on its own."""
-    return straightness(episode.motion, phase_boundaries(episode))
+    return straightness(episode.motion, phase_boundaries(episode, scale))
 
 
 @metric("", "lower", "position", "idle, whole episode")
@@ -95,7 +95,7 @@ def straightness(positions: FloatArray, boundaries: IntArray) -> float:
     return metrics.path_length(positions[ends]) / travelled
 
 
-def phase_boundaries(episode: Demonstration) -> IntArray:
+def phase_boundaries(episode: Demonstration, scale: Scale) -> IntArray:
     """Return the frames at which a phase ends and the next begins, `(P,)`.
 
     Where the recorded phase changes; without one, where a gripper opens or closes; without either or where
@@ -105,21 +105,21 @@ def phase_boundaries(episode: Demonstration) -> IntArray:
         if episode.has("phase"):
             states = [episode.column("phase").reshape(episode.count, -1)[:, 0]]
         else:
-            states = [gripper_state(each) for each in episode.grippers.T]
+            states = [gripper_state(each, scale.widest_opening) for each in episode.grippers.T]
         found = np.unique(np.concatenate([_changes(each) for each in states]))
     except DoesNotApply:
         found = np.empty(0, int)
     return found if found.size else farthest(episode.motion)
 
 
-def gripper_state(opening: FloatArray) -> IntArray:
+def gripper_state(opening: FloatArray, widest: float = 0.0) -> IntArray:
     """Return 1 where the gripper is open and 0 where closed, `(N,)`.
 
     Open from 75 % of the range it has in the episode, closed from 25 %, in between as before. One that only
-    trembles, by 0.005 or 1 % of its greatest opening, does neither.
+    trembles, by 0.005 or 1 % of the widest opening of any, does neither.
     """
     low, high = opening.min(), opening.max()
-    if high - low <= max(FLOOR, _TREMBLE * np.abs(opening).max()):
+    if high - low <= max(FLOOR, _TREMBLE * max(widest, np.abs(opening).max())):
         return np.zeros(len(opening), int)
     share = (opening - low) / (high - low)
     sure = np.where(share >= _HIGH, 1, np.where(share <= _LOW, 0, -1))

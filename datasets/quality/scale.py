@@ -84,7 +84,7 @@ class Scale:
     def __init__(self, margin: float = 0.1):
         """Begin without an episode."""
         self.margin = margin
-        self._parts: dict[str, Any] = {"action": Extent(), "inputs": Extent()}
+        self._parts: dict[str, Any] = {name: Extent() for name in ("action", "inputs", "grippers")}
         self._parts |= {name: Spread() for name in ("configuration", "observation", "relative_action")}
 
     def add(self, episode: Demonstration) -> None:
@@ -106,6 +106,11 @@ class Scale:
     def input_scale(self) -> FloatArray:
         """Largest input of each axis, `(u,)`."""
         return np.array([np.abs(each).max() for each in self.part("inputs").values])
+
+    @cached_property
+    def widest_opening(self) -> float:
+        """Largest opening of any gripper."""
+        return max((float(np.abs(each).max()) for each in self.part("grippers").values), default=0.0)
 
     def part(self, name: str) -> Any:
         """Return the `Spread` or the `Extent` of a part."""

@@ -126,8 +126,8 @@ def test_a_phase_ends_where_any_hand_s_gripper_closes():
     closed[10:, 0], closed[20:, 1] = 1.0, 1.0
     joints = ("left_pan.pos", "right_pan.pos")
     episode = recorded(walk(0, 30)[:, :2], joints, closed, ("left_gripper.pos", "right_gripper.pos"))
-    assert motion.phase_boundaries(episode).tolist() == [10, 20]
-    assert motion.phase_boundaries(episode.of_hand("left")).tolist() == [10]
+    assert motion.phase_boundaries(episode, Scale()).tolist() == [10, 20]
+    assert motion.phase_boundaries(episode.of_hand("left"), Scale()).tolist() == [10]
     assert episode.of_hand("right").motion.tolist() == episode.matrix("state")[:, 1:].tolist()
     with pytest.raises(DoesNotApply, match="third"):
         episode.of_hand("third")
