@@ -119,7 +119,10 @@ class Registry[Spec: Any](Mapping[str, Spec]):
     def _installed(self) -> dict[str, str]:
         entries = _entry_points(tuple(sys.path)).select(group=f"handrail.{self._thing}s")
         own_first = sorted(entries, key=lambda entry: not entry.value.startswith("handrail."))
-        return {entry.name: entry.value for entry in own_first}
+        found = dict[str, str]()
+        for entry in own_first:
+            found.setdefault(entry.name, entry.value)
+        return found
 
     def _spec(self, name: str, reference: str) -> Spec:
         spec = resolved(reference, f"{self._thing} {name}")

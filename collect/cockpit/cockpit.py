@@ -63,6 +63,7 @@ class Cockpit:
     ) -> None:
         self.person, self._server, self._refuses, self._say = person, server, refuses, say
         self._folder = str(config.dataset.folder) if config else ""
+        self._next = next_commands(Path(self._folder)) if self._folder else []
         self._wanted = config.dataset.num_episodes if config else 0
         self._shared = bool(config and config.policy)
         self._episodes, self._strain = EpisodeList(server), Strain()
@@ -125,7 +126,7 @@ class Cockpit:
             counts = ", ".join(f"{count} {why}" for why, count in self._all_dropped.items())
             self._say(f"dropped or refused by the page's server: {counts}")
         saved = self._episodes.saved
-        after = next_commands(Path(self._folder)) if saved and self._folder else []
+        after = self._next if saved else []
         self._server.pipe.send_surely(Kind.OVER, {"saved": saved, "folder": self._folder, "next": after})
         self._server.close()
 

@@ -68,7 +68,7 @@ def check_robot(config: CheckRobotConfig) -> int:
     if config.picture:
         from handrail.collect.world.robot_picture import draw_robot
 
-        draw_robot(config.robot, Path(config.picture))
+        draw_robot(config.robot, Path(config.picture).expanduser())
         say(f"drew {config.picture}")
     if not found:
         say(f"{config.robot}: nothing is wrong")

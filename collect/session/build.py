@@ -161,13 +161,13 @@ def _reason_against(mode: TeleopMode, model: RobotModel) -> str:
     if not mode.available:
         return f"expected the package {mode.module}, found none; install it"
     robot, channels, hand = model.description, Channels.of(model.description), model.hand.name
-    owned = dict.fromkeys((*mode.owned("hand", hand), *mode.owned("base", hand)))
-    if missing := ", ".join(group for group in owned if not channels.have(group)):
-        return f"expected a robot with channels {missing}, got {robot.name}"
-    with restated(f"mode {mode.name}", HandrailError):
+    with restated(f"mode {mode.name}"):  # whatever another package's code raises
+        owned = dict.fromkeys((*mode.owned("hand", hand), *mode.owned("base", hand)))
+        if missing := ", ".join(group for group in owned if not channels.have(group)):
+            return f"expected a robot with channels {missing}, got {robot.name}"
         spec = CONTROLLERS.find(mode.controller)
         resolved(spec.build)
-    return "" if spec.fits(robot) else f"its controller cannot drive {robot.name}: {spec.help}"
+        return "" if spec.fits(robot) else f"its controller cannot drive {robot.name}: {spec.help}"
 
 
 def session_features(env: HandrailEnv, shared: bool = False) -> dict[str, Feature]:

@@ -1,6 +1,7 @@
 """Shows a session in rerun, to a viewer or into a file."""
 
 import contextlib
+import os
 import time
 from collections.abc import Callable
 from typing import Any
@@ -133,7 +134,7 @@ class Display:
         self._drawing = Drawing(rr)
         rr.init("handrail")
         if save:
-            rr.save(save)
+            rr.save(os.path.expanduser(save))
         if spawn or web:
             self._open_viewer(web)
 

@@ -232,12 +232,13 @@ class EpisodeLoop:
         n, hands = self.env.model.size, len(self.env.model.description.hands)
         wanted, found = f"a Command with {n} velocities and {hands} grippers", f"a {type(command).__name__}"
         if isinstance(command, Command):
-            found += f" with {command.velocities.shape[1]} velocities and {len(command.grippers)} grippers"
+            sizes = command.velocities.shape[1], len(command.grippers)
+            found = f"a Command with {sizes[0]} velocities and {sizes[1]} grippers"
         if found != wanted:
             name = type(self._controller).__name__
             raise HandrailError(f"controller {name}: expected {wanted}, got {found}")
         valid = all(map(math.isfinite, command.grippers)) or all(map(math.isnan, command.grippers))
-        if valid and are_finite(command.velocities.ravel()):
+        if valid and math.isfinite(command.elapsed) and are_finite(command.velocities.ravel()):
             return command
         failed = replace(command.diagnostics, status=Status.SOLVER_FAILED)
         return Command(np.zeros((2, n)), self.control_period, 0.0, (math.nan,) * hands, failed)

@@ -40,9 +40,10 @@ def beside(path: Path, ending: str) -> Path:
 
 def check_room(what: str, path: Path) -> None:
     """Check that a folder is there or can be made, and can be written; `what` begins the error."""
-    existing = next(each for each in (path, *path.absolute().parents) if each.exists())
+    existing = next(each for each in (path, *path.absolute().parents) if os.path.lexists(each))
     if not existing.is_dir():
-        raise HandrailError(f"{what}: expected a folder, but {str(existing)!r} is a file")
+        kind = "a file" if existing.exists() else "a link to nowhere"
+        raise HandrailError(f"{what}: expected a folder, but {str(existing)!r} is {kind}")
     if not os.access(existing, os.W_OK | os.X_OK):
         raise HandrailError(f"{what}: expected a folder that can be written, but {str(existing)!r} cannot")
 

@@ -44,7 +44,7 @@ class FolderLock:
             return
         file, self._file = self._file, None
         with file:
-            mine = self._is_current(file)  # else the folder was replaced, and what is there is somebody else's
+            mine = self._is_current(file)  # else the folder was replaced by somebody else's
             if mine:
                 self._path.unlink()
         if mine:

@@ -6,12 +6,15 @@ import signal
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_helpers import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from toml_helpers import mutated
 
+from handrail.collect.world.scene import Scene, SceneObject, box
+from handrail.collect.world.stage import add_scene, new_stage
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS
@@ -80,6 +83,12 @@ def test_a_shape_with_a_name_that_is_taken_is_one_line(name, words, tmp_path):
     path.write_text(TEXTS["ridgeback_ur10"].replace("[[visual]]", shape, 1))
     assert words in refused("--robot", path, "--task", "pick_place", "--dataset.root", tmp_path / "set")
     assert not (tmp_path / "set").exists()
+
+
+def test_a_thing_of_a_task_that_is_wrong_is_not_blamed_on_the_robot():
+    thing, spec = SceneObject("mug", box((0.1, 0.1, 0.1)), np.array([1.0, 2.0])), new_stage(False)
+    with pytest.raises(HandrailError, match=r"\Athe task's 'mug': pos should be "):
+        add_scene(spec, Scene((thing,)))
 
 
 def beside(folder: Path, urdf: str) -> Path:

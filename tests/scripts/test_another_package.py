@@ -13,8 +13,12 @@ from command_helpers import ran, refused
 from press_kit import PRESS
 from training_helpers import TINY
 
+from handrail.collect.operators.modes import MODES
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.policies.imitation.evaluation.conditions import policy_conditions
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.interface.checkpoint import NAME
 from handrail.policies.study.design import StudyDesign, TaskDesign
 
 NAMED = {
@@ -121,6 +125,22 @@ def test_an_installed_entry_is_listed_recorded_and_found_again(installed, tmp_pa
     assert unseen()  # the help imports nothing
     ran(tmp_path / "set", "--task", "press", "--dataset.num_episodes", 1, "--time_limit", 0.5)
     ran(tmp_path / "set", name="replay")
+
+
+def test_an_entry_with_the_name_of_one_of_handrail_is_not_taken_for_it(tmp_path, monkeypatch):
+    install(tmp_path, "[handrail.modes]\nrl = press_kit:HAND\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert MODES["rl"].controller == "rl"
+
+
+def test_a_policy_that_names_a_module_is_evaluated_beside_one_of_a_mode(trained, tmp_path):
+    own = tmp_path / "own"
+    shutil.copytree(trained, own)
+    for path in own.rglob(NAME):
+        path.write_text(path.read_text().replace("press_kit:HAND", "ee"))
+    config = EvaluateConfig(policy=(str(trained), str(own)), mode="press_kit:HAND", robot="press_kit:TWIN")
+    found, refused = policy_conditions(replace(config, task="press_kit:PRESS"))
+    assert (len(found), refused) == (2, [])
 
 
 def test_a_metric_of_an_installed_package_is_in_the_report(recorded, tmp_path):

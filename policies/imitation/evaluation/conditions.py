@@ -250,10 +250,9 @@ def _as_asked(checkpoint: Checkpoint, config: EvaluateConfig) -> Checkpoint:
     """Return a checkpoint whose mode and rate are those of the settings, where these say any."""
     for name in ("mode", "fps"):
         asked, own = getattr(config, name), getattr(checkpoint.meta, name)
-        if asked and asked != own:
-            raise HandrailError(
-                f"--policy {checkpoint.folder}: expected --{name} {asked}, got one of {own!r}"
-            )
+        admits = name == "mode" and asked not in MODES  # `module:name`, for policies that name it
+        if asked and asked != own and not admits:
+            raise HandrailError(f"--policy {checkpoint.folder}: expected --{name} {own}, got {asked}")
     return checkpoint
 
 

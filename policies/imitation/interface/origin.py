@@ -32,7 +32,7 @@ def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> dict[str,
     robot = origin["robot"]
     if not robot or "/" in robot or robot.endswith(".toml"):
         origin["robot"] = re.sub(r"[^\w+:,.\- ]", "-", info.robot_type)
-    sentences = {sentence for row in rows for sentence in row.get("tasks") or [""]}
+    sentences = {"; ".join(row.get("tasks") or []) for row in rows}
     task = sentences.pop() if len(sentences) == 1 else ""
     return origin | {"task": task, "time_limit": _time_limit(recorded)}
 

@@ -96,10 +96,11 @@ def test_a_description_that_is_there_stays():
 
 
 @pytest.mark.needs_gl
-def test_a_robot_is_drawn(tmp_path):
+def test_a_robot_is_drawn(tmp_path, monkeypatch):
     """In colours: its shapes are orange, over what it looks like."""
     picture = tmp_path / "robot.png"
-    ran("ridgeback_ur10", "--picture", picture, name="robot check")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    ran("ridgeback_ur10", "--picture=~/robot.png", name="robot check")
     pixels = matplotlib.image.imread(picture)[..., :3]
     orange = (pixels[..., 0] > 0.6) & (pixels[..., 2] < 0.4)
     assert np.count_nonzero(orange) > 2000

@@ -83,8 +83,9 @@ def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path,
     monkeypatch.setattr(viewer.Viewer, "send", troubled)
     draw, drawn = Drawing.see, []
     monkeypatch.setattr(Drawing, "see", lambda self, frame: (drawn.append(frame), draw(self, frame)))
+    monkeypatch.setenv("HOME", str(tmp_path))
     saved = tmp_path / "seen.rrd"
-    done = command(*REACH, "--display_web", "--display_save", saved, tmp_path / "set")
+    done = command(*REACH, "--display_web", "--display_save=~/seen.rrd", tmp_path / "set")
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("the recording goes on") == 1
     info = read_info(tmp_path / "set")

@@ -13,7 +13,7 @@ from handrail.collect.session.session import Session
 from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.baselines.twist_completion import TwistController, WholeBodyCompletion
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.command import Command, Status
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.recording.frames import frame_row
 
@@ -21,6 +21,8 @@ CONFIG, MODEL = SessionConfig(task="reach", physics=False, time_limit=1.0), load
 STICKS = build_operator(CONFIG, MODES["ee"], MODEL)
 TABLE_ONLY = ControllerSpec("arm", lambda model, period: None, "of a table", fits=lambda robot: False)
 ARM = TeleopMode("arm", always("hand"), f"{__name__}:TABLE_ONLY", "an arm on a table")
+LIMBED = ControllerSpec("limbs", TABLE_ONLY.build, "of limbs", fits=lambda robot: robot.limbs > 1)
+LIMBS = TeleopMode("limbs", always("hand"), f"{__name__}:LIMBED", "many limbs")
 WAND = TeleopMode("wand", always("hand"), "mpc", "with a wand", module="no_such_wand")
 
 
@@ -59,6 +61,7 @@ def singular(q, previous, twist, period):
         Changed(with_gap),
         Changed(lambda command: replace(command, velocities=np.full_like(command.velocities, np.inf))),
         Changed(lambda command: replace(command, grippers=(np.inf,))),
+        Changed(lambda command: replace(command, elapsed=np.nan)),
         *(
             TwistController(MODEL, rule)
             for rule in (
@@ -102,9 +105,17 @@ def test_a_command_of_another_size_is_refused_in_one_line(change, got):
     assert str(error.value) == wanted + got
 
 
+def test_a_command_may_be_of_a_class_of_its_own():
+    class Told(Command):
+        """A command that says more."""
+
+    assert run(Changed(lambda command: Told(**vars(command))))[0].brakes == 0
+
+
 @pytest.mark.parametrize(
     ("mode", "told"),
     [
+        ("LIMBS", "'RobotDescription' object has no attribute 'limbs'"),
         ("ARM", "its controller cannot drive ridgeback_ur10: of a table"),
         ("WAND", "expected the package no_such_wand, found none; install it"),
     ],

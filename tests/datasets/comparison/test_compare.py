@@ -188,6 +188,7 @@ WRONG = [
     ((*BOTH, "--baseline", "z"), "unknown baseline 'z': expected one of quick, slow"),
     ((*BOTH, "--margin", "-1"), "--margin: expected a number >= "),
     ((*BOTH, "--output", "{quick}/meta/info.json"), "expected a folder, but '.*info.json' is a file"),
+    ((*BOTH, "--output", "{link}"), "expected a folder, but '.*/gone' is a link to nowhere"),
     (("nowhere", "--output", "{quick}/meta/info.json/a/b"), "expected a folder, but '.*info.json' is a file"),
     ((*BOTH, "--evaluations", "no.json"), "no.json': expected evaluations"),
     ((*BOTH, "--speed", "9"), "--speed"),
@@ -195,7 +196,8 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG)
-def test_wrong_input_is_one_line(arguments, message, ours):
-    words = [word.format(quick=ours[0], slow=ours[1]) for word in arguments]
+def test_wrong_input_is_one_line(arguments, message, ours, tmp_path):
+    (link := tmp_path / "gone").symlink_to(tmp_path / "nowhere")
+    words = [word.format(quick=ours[0], slow=ours[1], link=link) for word in arguments]
     line = refused(*words, name="compare")
     assert re.search(message, line), line

@@ -283,8 +283,8 @@ def test_a_mode_or_rate_that_the_policy_says_itself_is_taken_or_refused(folder):
     said = policy_conditions(config(folder, "chase"))
     assert policy_conditions(config(folder, "chase", mode="ee", fps=20)) == said
     for other, named in (
-        ({"mode": "direct"}, "--mode direct, got one of 'ee'"),
-        ({"fps": 30}, "--fps 30, got one of 20"),
+        ({"mode": "direct"}, "--mode ee, got direct"),
+        ({"fps": 30}, "--fps 20, got 30"),
     ):
         with pytest.raises(HandrailError, match=rf"\A--policy .*chase: expected {named}\Z"):
             policy_conditions(config(folder, "chase", **other))

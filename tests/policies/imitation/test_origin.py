@@ -70,6 +70,8 @@ def test_a_policy_hears_the_sentence_that_it_learnt_with(recorded, tmp_path, mon
     assert heard_by(folder) == {build_task(SessionConfig(task="reach")).description}
     rows = read_episodes(recorded)
     assert origin_of(read_info(recorded), [*rows, rows[0] | {"tasks": ["another"]}])["task"] == ""
+    both = [rows[0] | {"tasks": ["open", "close"]}]
+    assert origin_of(read_info(recorded), both)["task"] == "open; close"  # as it is taught
 
 
 def test_a_policy_of_recordings_with_a_mask_is_evaluated(tmp_path):
