@@ -40,6 +40,7 @@ from handrail.datasets.storage.atomic import beside, explained, remove
 from handrail.datasets.storage.lock import FolderLock, HeldError
 from handrail.datasets.storage.strict_json import load_json, write_json
 
+_PLAN = "plan.json"
 _FORMAT = "handrail.shards/1"
 _DYING = 60.0  # of a worker whose parent or computer is lost [s]
 _MOMENT = 0.1  # [s]
@@ -65,7 +66,7 @@ class Shards:
         self._config = config
         self.root = Path(os.path.realpath(config.dataset.folder))
         self.folder = beside(self.root, "shards")
-        self._file = self.folder / "plan.json"
+        self._file = self.folder / _PLAN
 
     @property
     def begun(self) -> bool:
@@ -168,6 +169,9 @@ def record_shard(config: RecordConfig, folder: Path, first: int, episodes: int) 
         first: number of its first episode in the whole.
         episodes: how many it has.
     """
+    if not (folder.parent / _PLAN).is_file():
+        words = "expected the folder of the command, which all computers have to share; found none"
+        raise HandrailError(f"{str(folder.parent)!r}: {words}")
     env, recording = _recording(config)
     own = replace(config, dataset=replace(config.dataset, place=str(folder), root=""))
     with _opened(own, folder, env) as writer:

@@ -33,7 +33,7 @@ class Cluster:
         if self._joined:
             _join(address)
         once: dict[str, Any] = {"max_calls": 1} if fresh else {}
-        self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1, **once)(attempt_alone)
+        self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1, **once)(_attempt_in)
         self._running: dict[Any, Job] = {}
 
     @property
@@ -43,7 +43,7 @@ class Cluster:
 
     def start(self, job: Job) -> None:
         """Give a job to the cluster."""
-        self._running[self._attempt.remote(job)] = job
+        self._running[self._attempt.remote(job, os.getcwd())] = job
 
     def wait(self) -> list[Result]:
         """Wait a moment; return what has finished."""
@@ -58,6 +58,13 @@ class Cluster:
         self._running.clear()
         if self._joined:
             ray.shutdown()
+
+
+def _attempt_in(job: Job, folder: str) -> Result:
+    """Do a job in the folder of the command, where there is one: its relative paths begin there."""
+    with suppress(OSError):
+        os.chdir(folder)
+    return attempt_alone(job)
 
 
 def _result(job: Job, reference: Any) -> Result:

@@ -6,7 +6,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -81,10 +81,14 @@ def attempt(job: Job) -> Result:
 
 def attempt_alone(job: Job) -> Result:
     """Do a job in a process that shares the cores with others: one BLAS thread, all output in its log."""
-    with threadpool_limits(1), _output_into(job.log) if job.log else contextlib.nullcontext():
-        result = attempt(job)
-        if result.error and job.log:
-            Terminal(stderr=True).print(f"error: {result.error}")
+    result = Result(job)
+    try:
+        with threadpool_limits(1), _output_into(job.log) if job.log else contextlib.nullcontext():
+            result = attempt(job)
+            if result.error and job.log:
+                Terminal(stderr=True).print(f"error: {result.error}")
+    except OSError as error:  # of its log
+        return replace(result, error=result.error or f"{job.log}: {message_of(error)}")
     return result
 
 

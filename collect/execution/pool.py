@@ -121,11 +121,9 @@ class ProcessPool:
             self.start(job)
             return None
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return Result(
-            job,
-            error=f"a worker was killed {TRIES} times while it did this ({how}), perhaps for want of memory;"
-            " finished work is kept, and the same command goes on; fewer --workers need less",
-        )
+        hint = ", perhaps for want of memory: fewer --workers need less" if code == -signal.SIGKILL else ""
+        error = f"a worker ended {TRIES} times while it did this ({how}){hint};"
+        return Result(job, error=f"{error} finished work is kept, and the same command goes on")
 
 
 def _serve(jobs: Connection) -> None:

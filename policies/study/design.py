@@ -65,7 +65,7 @@ from msgspec import Meta
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, check_known
-from handrail.controllers.typed import AtLeastOne, Count
+from handrail.controllers.typed import AtLeastOne, Count, Fraction
 
 MOST_DRAWS = 1000
 MIXED = "_and_"  # between the modes of a recording that has several
@@ -94,8 +94,8 @@ class DeclaredPair:
     one: str
     other: str
     budget: Literal["time", "number"] = "time"
-    margin: float = 0.0
-    sd: float = 0.1
+    margin: Fraction = 0.0
+    sd: Fraction = 0.1
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class Rounds:
     ways: Mapping[str, Way]
     count: Annotated[int, Meta(ge=1, le=20)] = 2
     primary: tuple[tuple[str, str], ...] = ()
-    sd: float = 0.1
+    sd: Fraction = 0.1
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
@@ -185,7 +185,8 @@ class StudyDesign:
             "mode of a pair", (mode for each in self.pairs for mode in (each.one, each.other)), self.modes
         )
         pairs = [(each.one, each.other, each.budget) for each in self.pairs]
-        if len(set(pairs)) < len(pairs) or any(one == other for one, other, _ in pairs):
+        told_apart = {(frozenset(two), budget) for *two, budget in pairs if len(set(two)) > 1}
+        if len(told_apart) < len(pairs):
             raise HandrailError(f"study {self.name}: pairs: expected two modes each, once, got {pairs}")
         counted = beside if beside.same_number == self.draws else Beside()
         numbered = counted.numbered or (self.modes if counted.same_number else ())
@@ -208,6 +209,10 @@ class StudyDesign:
         if robust := self.robustness:
             once["robustness"] = (*robust.perturbations, *robust.protections)
             draws["robustness.draws"] = robust.draws
+            idle = {"none"} & {*robust.perturbations} | {"own", "all"} & {*robust.protections}
+            if idle:
+                words = "robustness: expected what changes something, got"
+                raise HandrailError(f"study {self.name}: {words} {', '.join(sorted(idle))}")
         for name, chosen in once.items():
             if not chosen or len(set(chosen)) < len(chosen):
                 raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
@@ -224,12 +229,14 @@ class StudyDesign:
             if getattr(self, other):
                 raise HandrailError(f"{where}: expected no {other} beside them")
         check_known("mode of rounds", self.modes, MODES)
+        if len(rounds.ways) < 2:
+            raise HandrailError(f"{where}: expected two ways or more, got {', '.join(rounds.ways) or 'none'}")
         for way in rounds.ways:
             if not way.isidentifier():
                 raise HandrailError(f"{where}: expected ways whose names are words, got {way!r}")
         for pair in rounds.primary:
             check_known("way", pair, rounds.ways)
-            if len(set(pair)) < 2 or rounds.primary.count(pair) > 1:
+            if len(set(pair)) < 2 or [set(each) for each in rounds.primary].count(set(pair)) > 1:
                 raise HandrailError(f"{where}: primary: expected two ways each, once, got {rounds.primary}")
         for task, each in self.tasks.items():
             if not each.round_minutes or each.sizes:

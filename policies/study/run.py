@@ -46,7 +46,8 @@ def run_study(config: StudyConfig, work: Work = do, isolated: bool = True) -> in
     console.print(told)
     if config.plan:
         return 0
-    check_trainable("handrail-study", design.policy)
+    if not config.report_only:
+        check_trainable("handrail-study", design.policy)
     if config.page:
         with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
     with explained(f"--output {config.output}: expected a folder that can be written"):

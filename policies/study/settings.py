@@ -7,8 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
+from handrail.collect.operators.catalogue import OPERATORS
+from handrail.collect.operators.modes import MODES
+from handrail.collect.session.perturbations import PICTURES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, check_known, restated, unknown_name
+from handrail.controllers.robot.description import load_description
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import decoded
 from handrail.policies.imitation.config import TrainConfig
@@ -39,7 +43,7 @@ def load_design(name: str) -> StudyDesign:
         known = sorted(each.stem for each in PRESETS.glob("*.toml"))
         raise unknown_name("study", name, [*known, "a file that ends in .toml"])
     content, where = read_toml(path, "study"), f"study {name}"
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, default=str)
     own = {"name": path.stem, "digest": hashlib.sha256(text.encode()).hexdigest()[:16]}
     for entry in own.keys() & content.keys():
         raise HandrailError(
@@ -202,11 +206,25 @@ def check_jobs(design: StudyDesign) -> None:
     """Check the settings of every job of a study before one begins."""
     for job in jobs(design):
         with restated(f"study {design.name}, {job.name}", HandrailError):
-            recording(job.cell, design, _DATASET).check()
+            (recorded := recording(job.cell, design, _DATASET)).check()
+            mode = MODES[recorded.mode]
+            load_description(recorded.robot).check_hands(f"mode {mode.name}", mode.hands)
+            if OPERATORS.find(recorded.operator).interactive:
+                words = "expected a script or a supervisor of each way, got"
+                raise HandrailError(f"operator: {words} {recorded.operator}")
             if job.policy:
                 training(job.policy, design, _DATASET, _POLICY).check()
                 for config in evaluations(job, design).values():
                     config.check()
+                    seen = [
+                        each.text
+                        for each in config.perturbations
+                        if not each.sizes.keys().isdisjoint(PICTURES)
+                    ]
+                    if seen and not design.encoders:
+                        raise HandrailError(
+                            f"perturbations: expected encoders for {', '.join(seen)}, got none"
+                        )
 
 
 def _some(config: Any, names: tuple[str, ...]) -> dict[str, Any]:

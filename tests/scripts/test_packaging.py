@@ -122,6 +122,20 @@ def test_setup_passes_over_a_python_that_does_not_run(setup, where, tmp_path):
     assert f"venv by {found}" in done.stdout
 
 
+@pytest.mark.skipif(any(Path("/usr/bin").glob("python3.1[2-9]")), reason="it would be found")
+def test_setup_says_where_a_python_comes_from(setup):
+    done = setup()
+    assert done.returncode == 1
+    assert "make setup PYTHON=/path/to/python3.12" in done.stderr
+
+
+def test_setup_brings_pip_to_an_environment_without(setup, tmp_path):
+    answers = 'case "$1$2" in -mpip) exit 1;; -mensurepip) echo brought; exit 9;; esac'
+    script(tmp_path / ".venv/bin/python", answers)
+    done = setup()
+    assert (done.returncode, done.stdout) == (9, "brought\n")
+
+
 def test_setup_says_what_to_do_without_python(setup, tmp_path):
     done = setup(str(tmp_path / "bin" / "python3.12"))
     assert done.returncode == 1

@@ -59,13 +59,18 @@ def test_one_of_another_rate_or_robot_or_no_dataset_is_left_alone(tmp_path):
 def test_no_episode_is_recorded_again_after_an_edit(tmp_path):
     """At once, in two goes, or by a worker: an edit gives episodes other numbers, and seeds follow."""
     flags = ("--task", "reach", "--time_limit", "0.2", "--no_physics", "--dataset.num_episodes")
-    root, once, part = tmp_path / "d", tmp_path / "at_once", tmp_path / "part"
+    root, once, part = tmp_path / "d", tmp_path / "at_once", tmp_path / "shards" / "part"
     ran(root, *flags, 7)
     ran(root, "--episodes", "1,3,4", "--in_place", name="delete")
     shutil.copytree(root, once)
     before = [row["seed"] for row in read_episodes(root)]
-    dataset = DatasetConfig(root=str(root), num_episodes=6)
-    record_shard(RecordConfig(task="reach", time_limit=0.2, physics=False, dataset=dataset), part, 4, 6)
+    config = RecordConfig(
+        task="reach", time_limit=0.2, physics=False, dataset=DatasetConfig(root=str(root), num_episodes=6)
+    )
+    with pytest.raises(HandrailError, match="expected the folder of the command, which all computers have"):
+        record_shard(config, part, 4, 6)
+    (part.parent / "plan.json").touch()
+    record_shard(config, part, 4, 6)
     ran(once, *flags, 6, "--resume")
     for episodes in (2, 4):
         ran(root, *flags, episodes, "--resume")

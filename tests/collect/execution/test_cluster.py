@@ -1,6 +1,7 @@
 """On a Ray cluster of two computers, both here, jobs give what they give anywhere, also when one is lost."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 from canned import canned
 from command_helpers import ran, refused
 from datasets_helpers import tree
+from places import ROOT
 from ray_helpers import record_with_a_loss
 from shared_helpers import content, saved, started, wait_until
 
@@ -17,7 +19,7 @@ from handrail.datasets.reading.digest import digest_of_dataset
 
 pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-EPISODES = 40
+EPISODES, ROBOTS = 40, ROOT / "controllers" / "robot" / "robots"
 FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3"]
 
 
@@ -72,6 +74,12 @@ def test_the_same_rows_from_one_two_and_three_workers_and_from_the_cluster(clust
     for number, where in enumerate(places):
         ran(tmp_path / str(number), *FLAGS, "--dataset.num_episodes", 12, *where)
     assert len({digest_of_dataset(tmp_path / str(number)) for number in range(len(places))}) == 1
+
+
+def test_a_relative_path_is_the_command_s(cluster, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROBOTS / "ridgeback_ur10.toml", "mine.toml")
+    ran("set", *FLAGS, "--robot", "mine.toml", "--dataset.num_episodes", 1, "--ray", cluster.address)
 
 
 def test_no_cluster_is_one_line(tmp_path):

@@ -105,13 +105,24 @@ def test_a_killed_worker_s_job_runs_again_and_no_other_does(config, tmp_path):
 def test_a_job_that_always_kills_its_worker_is_given_up_and_named(config, tmp_path):
     jobs, said = [Job("poison", dying, (tmp_path, "poison", 99)), Job("fine", squared, (3,))], io.StringIO()
     found = run(jobs, config, said=said)
-    why = "lost {} times with" if config.ray else "a worker was killed {} times while it did this (SIGKILL)"
+    why = (
+        "lost {} times with" if config.ray else "a worker ended {} times while it did this (SIGKILL), perhaps"
+    )
     assert why.format(TRIES) in found["poison"].error
     assert "\n" not in found["poison"].error
     assert found["fine"].value == 9
     assert len(list(tmp_path.iterdir())) == TRIES
     assert f"failed: poison: {why.format(TRIES)}" in said.getvalue()
     assert "failed: fine" not in said.getvalue()
+
+
+def test_a_log_that_cannot_be_is_what_the_job_failed_of(tmp_path):
+    (file := tmp_path / "file").touch()
+    jobs = [Job("silent", squared, (3,), log=file / "x.log"), Job("fine", squared, (3,))]
+    found = run(jobs, ExecutionConfig(workers=2))
+    assert "file" in found["silent"].error
+    assert "worker" not in found["silent"].error
+    assert found["fine"].value == 9
 
 
 @elsewhere

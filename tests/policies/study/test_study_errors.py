@@ -27,7 +27,8 @@ from handrail.policies.study.design import (
 from handrail.policies.study.settings import load_design
 
 SHOWN = ("\n", " = "), ("[", ""), ("[rounds.", ".")
-PAIR = "[[pairs]]\none = 'ee'\nother = 'direct'\n"
+FRACTIONS = ("margin = 10", "margin = -0.1", "margin = nan", "sd = 1e200", "sd = nan", "sd = -5.0")
+PAIR, TURNED = "[[pairs]]\none = 'ee'\nother = 'direct'\n", "[[pairs]]\none = 'direct'\nother = 'ee'\n"
 
 
 @pytest.mark.parametrize(
@@ -72,6 +73,14 @@ PAIR = "[[pairs]]\none = 'ee'\nother = 'direct'\n"
         (('["push"]\nprotections = ["filter"]', "[]\nprotections = []"), "robustness expected some"),
         (('["filter"]', '["fltr"]'), "unknown protection 'fltr'"),
         (("rollouts = 20\ndraws = 2", "draws = 3"), "robustness.draws expected at most 2 draws"),
+        (('["push"]', '["none", "push"]'), "robustness: expected what changes something, got none"),
+        (('["filter"]', '["own"]'), "robustness: expected what changes something, got own"),
+        (('["push"]', '["push", "blank"]'), "perturbations: expected encoders for blank:1, got none"),
+        (('"direct"]', '"direct", "both"]'), "mode both: expected a robot with 2 hands"),
+        (("[beside]", PAIR + TURNED + "[beside]"), "pairs: expected two modes each, once"),
+        *((("[beside]", f"{PAIR}{entry}\n[beside]"), entry.split()[0]) for entry in FRACTIONS),
+        (("draws = 2", "draws = 2020-01-01"), "draws"),
+        (("draws = 2", "draws = 2\nwhen = 07:32:00"), "when"),
         (("[tasks.reach]", "[tasks.reach"), "not valid TOML"),
         (("draws = 2", 'draws = 2\ndigest = "0"'), "digest"),
         (("[beside]", "[[beside]]"), "beside"),
@@ -152,6 +161,9 @@ def test_a_missing_package_is_named_before_anything_begins(missing, tmp_path, pr
     with pytest.raises(HandrailError, match=f"handrail-study: expected {missing}"):
         run_here(StudyConfig(preset, str(tmp_path / "study")), starter)
     assert starter.begun == []
+    (tmp_path / "study" / "begun").mkdir(parents=True)
+    if missing == "accelerate":  # nothing is trained
+        assert run_here(StudyConfig(preset, str(tmp_path / "study"), report_only=True), starter) == 0
 
 
 @pytest.mark.parametrize(

@@ -224,6 +224,11 @@ def test_the_effort_is_of_all_draws_by_the_minute(made):
         (("[rounds.ways.more]", '[rounds.ways."../x"]'), r"names are words, got '\.\./x'"),
         (("[rounds]", "[beside]\ndraws = 1\n[rounds]"), "rounds: expected no beside"),
         (("draws = 2", "draws = 2\ncurve = [5]"), "rounds: expected no curve"),
+        (
+            ('"hand_supervisor"\narbiter = "by_mask"', '"browser"'),
+            "expected a script or a supervisor of each way",
+        ),
+        (('[["helped", "more"]]', '[["helped", "more"], ["more", "helped"]]'), "primary: expected two ways"),
         (("round_minutes", "sizes = [0.05]\nround_minutes"), r"of task reach, got sizes \(0.05,\)"),
         (("base+ee", "ee_and_base+ee"), "unknown mode of rounds 'ee_and_base"),
         (('"by_mask"', '"by_luck"'), "by_luck"),
