@@ -158,10 +158,10 @@ def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode
 
 def _reason_against(mode: TeleopMode, model: RobotModel) -> str:
     """Return why a robot cannot be driven in a mode; "" if it can. Imports the mode's controller."""
-    if not mode.available:
-        return f"expected the package {mode.module}, found none; install it"
     robot, channels, hand = model.description, Channels.of(model.description), model.hand.name
     with restated(f"mode {mode.name}"):  # whatever another package's code raises
+        if not mode.available:
+            return f"expected the package {mode.module}, found none; install it"
         owned = dict.fromkeys((*mode.owned("hand", hand), *mode.owned("base", hand)))
         if missing := ", ".join(group for group in owned if not channels.have(group)):
             return f"expected a robot with channels {missing}, got {robot.name}"

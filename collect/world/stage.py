@@ -23,13 +23,13 @@ def new_stage(looks: bool) -> MjSpec:
 
 def add_scene(spec: MjSpec, scene: Scene) -> None:
     """Add the objects and the scene camera to the spec of a robot."""
-    taken = {part.name for part in (*spec.bodies, *spec.geoms, *spec.joints)}  # by the robot
+    taken = {part.name for part in (*spec.bodies, *spec.geoms, *spec.joints)} - {"world", "floor"}
     for item in scene.objects:
-        words = f"the task's {item.name!r}"
+        blamed = thing = f"the task's {item.name!r}"
         if taken & {item.name, *(f"{item.name}_{index}" for index in range(len(item.solids)))}:
             own = f"robot {spec.modelname}: expected no shape or joint called as"
-            words = f"{own} {words}; rename it in its description"
-        with restated(words, ValueError):
+            blamed = f"{own} {thing}; rename it in its description"
+        with restated(blamed, ValueError):
             _add_object(spec, item)
     spec.worldbody.add_camera(name=SCENE_CAMERA, fovy=scene.view.fovy, **_view_pose(scene.view))
 

@@ -67,7 +67,7 @@ def measure_views(
     for groups in sets:
         _share_scales(list(groups.values()), margin)
     placed = _placed([group for groups in sets for group in groups.values()])
-    if any(metric.needs == "scale" for metric in metrics):
+    if any(metric.needs for metric in metrics):
         for episode, where in _each(placed):
             for scale in {group.scale for group, _ in where}:
                 scale.add(episode)

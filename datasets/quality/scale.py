@@ -4,6 +4,7 @@ Episodes come one after the other and need not stay: sums, ranges and scatter ar
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -84,11 +85,15 @@ class Scale:
     def __init__(self, margin: float = 0.1):
         """Begin without an episode."""
         self.margin = margin
-        self._parts: dict[str, Any] = {name: Extent() for name in ("action", "inputs", "grippers")}
+        self.widest_opening = 0.0
+        """Largest opening of any gripper, of the episodes that tell one."""
+        self._parts: dict[str, Any] = {"action": Extent(), "inputs": Extent()}
         self._parts |= {name: Spread() for name in ("configuration", "observation", "relative_action")}
 
     def add(self, episode: Demonstration) -> None:
         """Add an episode; a part that one episode lacks is missing for all."""
+        with suppress(DoesNotApply):
+            self.widest_opening = max(self.widest_opening, float(np.abs(episode.grippers).max()))
         for name, part in self._parts.items():
             if isinstance(part, DoesNotApply):
                 continue
@@ -106,11 +111,6 @@ class Scale:
     def input_scale(self) -> FloatArray:
         """Largest input of each axis, `(u,)`."""
         return np.array([np.abs(each).max() for each in self.part("inputs").values])
-
-    @cached_property
-    def widest_opening(self) -> float:
-        """Largest opening of any gripper."""
-        return max((float(np.abs(each).max()) for each in self.part("grippers").values), default=0.0)
 
     def part(self, name: str) -> Any:
         """Return the `Spread` or the `Extent` of a part."""

@@ -104,7 +104,7 @@ def rename_away(root: Path) -> None:
 
 
 def left_of(root: Path) -> str:
-    """Return what to do where files of the dataset that one of this name has replaced are left; else ""."""
+    """Return a hint if files of the dataset that was replaced could not be removed; else ""."""
     old = beside(root, "replaced")
     if any(path.is_file() for folder in FOLDERS for path in (old / folder).rglob("*")):
         return f"{str(old)!r} could not be removed and holds what was there: remove it"
@@ -122,8 +122,8 @@ def settle(root: Path) -> bool:
     if not (old.exists() or draft.root.exists()):  # as `publish_folder` calls them
         return False
     with _locked(draft) as lock:
-        finished = is_dataset(Layout(old))
-        if finished and not is_dataset(dataset):  # cut short between its two names
+        finished = any(not path.is_dir() for path in old.rglob("*"))  # folders alone are what NFS keeps
+        if is_dataset(Layout(old)) and not is_dataset(dataset):  # cut short between its two names
             if is_dataset(draft):
                 os.replace(draft.root, root)
                 lock.moved(dataset.staging)
@@ -151,7 +151,7 @@ def _locked(draft: Layout) -> Iterator[FolderLock]:
 
 
 def _clear(draft: Layout) -> None:
-    """Remove all but the lock of a draft, which may have got its name."""
+    """Empty a draft's folder, but for its lock; it may have been renamed already."""
     if draft.root.exists():
         clear_staging(draft)
         for path in set(draft.root.iterdir()) - {draft.staging}:

@@ -48,7 +48,7 @@ class FolderLock:
             if mine:
                 self._path.unlink()
         if mine:
-            with contextlib.suppress(OSError):  # not empty: worth a look; NFS keeps it until it is closed
+            with contextlib.suppress(OSError):  # not before it is closed, for NFS; something else is in it
                 self._path.parent.rmdir()
 
     def moved(self, staging: Path) -> None:

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -204,11 +205,12 @@ def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
 
 def check_jobs(design: StudyDesign) -> None:
     """Check the settings of every job of a study before one begins."""
+    described = cache(load_description)
     for job in jobs(design):
         with restated(f"study {design.name}, {job.name}", HandrailError):
             (recorded := recording(job.cell, design, _DATASET)).check()
-            mode = MODES[recorded.mode]
-            load_description(recorded.robot).check_hands(f"mode {mode.name}", mode.hands)
+            for mode in job.cell.rounds[0].mode.split(MIXED):
+                described(recorded.robot).check_hands(f"mode {mode}", MODES[mode].hands)
             if OPERATORS.find(recorded.operator).interactive:
                 words = "expected a script or a supervisor of each way, got"
                 raise HandrailError(f"operator: {words} {recorded.operator}")

@@ -89,6 +89,9 @@ def test_a_thing_of_a_task_that_is_wrong_is_not_blamed_on_the_robot():
     thing, spec = SceneObject("mug", box((0.1, 0.1, 0.1)), np.array([1.0, 2.0])), new_stage(False)
     with pytest.raises(HandrailError, match=r"\Athe task's 'mug': pos should be "):
         add_scene(spec, Scene((thing,)))
+    for name in "floor", "world":
+        with pytest.raises(HandrailError, match=rf"\Athe task's '{name}': .*repeated name"):
+            add_scene(new_stage(False), Scene((SceneObject(name, box((0.1, 0.1, 0.1)), np.zeros(3)),)))
 
 
 def beside(folder: Path, urdf: str) -> Path:

@@ -136,3 +136,18 @@ def test_a_phase_ends_where_any_hand_s_gripper_closes():
 def test_a_hand_s_point_is_a_position():
     assert quantity("left.tool.x") == quantity("tool.qw") == "position"
     assert quantity("knee.x") == ""
+
+
+def test_a_gripper_that_trembles_is_told_by_the_widest_opening_of_all_episodes():
+    """Whatever is measured besides, and whatever an episode lacks."""
+    joints, rng = ("pan.pos", "lift.pos"), np.random.default_rng(0)
+    openings = [np.repeat([60.0, 2.0], 40)[:, None], rng.uniform(0.0, 0.3, (80, 1)), np.full((80, 1), np.nan)]
+    episodes = [recorded(walk(0)[:, :2], joints, each, ("gripper.pos",)) for each in openings]
+    asked = {"metrics": [motion.path_efficiency]}
+    found = [
+        measure({"": some}, rng, **how).values["path_efficiency"][""].values[:2]
+        for some, how in ((episodes[:2], {}), (episodes[:2], asked), (episodes, {}))
+    ]
+    assert found[0].tolist() == found[1].tolist() == found[2].tolist()
+    still = recorded(walk(0)[:, :2], joints, np.zeros((80, 1)), ("gripper.pos",))
+    assert found[0][1] == motion.path_efficiency.measure(still, Scale())

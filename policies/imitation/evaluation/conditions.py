@@ -224,6 +224,9 @@ def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], li
             checkpoints.append(_as_asked(read_checkpoint(folder, config), config))
         except HandrailError as error:
             refused[str(error)] = None
+    modes = {checkpoint.meta.mode for checkpoint in checkpoints}
+    if config.mode and modes and config.mode not in modes:
+        raise HandrailError(f"--mode {config.mode}: expected a policy of it, got {', '.join(sorted(modes))}")
     environments = {checkpoint.meta.environment for checkpoint in checkpoints}
     if len(environments) > 1:
         raise HandrailError(
@@ -250,8 +253,8 @@ def _as_asked(checkpoint: Checkpoint, config: EvaluateConfig) -> Checkpoint:
     """Return a checkpoint whose mode and rate are those of the settings, where these say any."""
     for name in ("mode", "fps"):
         asked, own = getattr(config, name), getattr(checkpoint.meta, name)
-        admits = name == "mode" and asked not in MODES  # `module:name`, for policies that name it
-        if asked and asked != own and not admits:
+        is_trusted = name == "mode" and asked not in MODES  # a `module:name`: others may have other modes
+        if asked and asked != own and not is_trusted:
             raise HandrailError(f"--policy {checkpoint.folder}: expected --{name} {own}, got {asked}")
     return checkpoint
 

@@ -10,6 +10,7 @@ from msgspec import Meta
 from handrail.collect.config import FPS_RANGE, MOST_TIME, check_fps
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_file, check_names, names, one_of, only_one
+from handrail.collect.operators.modes import MODES
 from handrail.collect.seeds import MOST_ROLLOUTS, evaluation_seed
 from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.world.tasks.catalogue import TASKS
@@ -86,6 +87,8 @@ class EvaluateConfig(ExecutionConfig):
         self.check_execution()
         if self.task:
             TASKS.check(self.task)
+        if self.mode:
+            MODES.check(self.mode)
         check_fps(self.fps or FPS_RANGE[0], "--fps")
         check_names("protection", "--protection", self.protections, PROTECTIONS)
         if not self.perturbations or len(set(self.perturbations)) != len(self.perturbations):

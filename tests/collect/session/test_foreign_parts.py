@@ -23,6 +23,7 @@ TABLE_ONLY = ControllerSpec("arm", lambda model, period: None, "of a table", fit
 ARM = TeleopMode("arm", always("hand"), f"{__name__}:TABLE_ONLY", "an arm on a table")
 LIMBED = ControllerSpec("limbs", TABLE_ONLY.build, "of limbs", fits=lambda robot: robot.limbs > 1)
 LIMBS = TeleopMode("limbs", always("hand"), f"{__name__}:LIMBED", "many limbs")
+STAFF = TeleopMode("staff", always("hand"), "mpc", "with a staff", module="no_such.staff")
 WAND = TeleopMode("wand", always("hand"), "mpc", "with a wand", module="no_such_wand")
 
 
@@ -117,6 +118,7 @@ def test_a_command_may_be_of_a_class_of_its_own():
     [
         ("LIMBS", "'RobotDescription' object has no attribute 'limbs'"),
         ("ARM", "its controller cannot drive ridgeback_ur10: of a table"),
+        ("STAFF", "No module named 'no_such'"),
         ("WAND", "expected the package no_such_wand, found none; install it"),
     ],
 )

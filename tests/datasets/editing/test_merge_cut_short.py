@@ -1,5 +1,6 @@
 """A merge that fails or is killed changes nothing, or has done it all."""
 
+import contextlib
 import errno
 import os
 import shutil
@@ -12,11 +13,12 @@ from datasets_helpers import TINY_FEATURES, record, resume, tree
 from editing_helpers import content, part
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.config import SplitConfig
+from handrail.datasets.editing.config import DeleteConfig, SplitConfig
 from handrail.datasets.editing.edit import edit
 from handrail.datasets.editing.merge import drop_episodes, merge_datasets
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
+from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.recording.rewrite import drafted, settle
 from handrail.scripts import cli
@@ -125,6 +127,9 @@ def test_edits_where_an_open_file_keeps_a_name_until_it_is_closed(tmp_path, monk
             if path.is_file() and not path.name.startswith(".nfs"):
                 removed(path)
         clear(folder)
+        for each in sorted(folder.rglob("*"), reverse=True):
+            if each.is_dir() and not any(each.iterdir()):
+                rmtree(each)
         if not any(folder.rglob(".nfs*")):
             rmtree(folder)
         elif not ignore_errors:
@@ -136,9 +141,35 @@ def test_edits_where_an_open_file_keeps_a_name_until_it_is_closed(tmp_path, monk
     for reason in "once", "again", "and again":
         labels = "--label", "failure", "--reason", reason
         ran(root, "--episodes", 0, *labels, "--in_place", name="edit relabel")
+        clear(tmp_path)
     with resume(root):
         pass
     with pytest.raises(HandrailError, match="no episode"), drafted(root, True):
         raise HandrailError("no episode")
     assert not check_report(root)
     assert sorted(os.listdir(tmp_path)) == ["set"]
+
+
+def test_an_edit_cut_short_as_the_old_files_go_is_not_done_twice(tmp_path, monkeypatch):
+    made, real, k = record(tmp_path / "made", 4, features=TINY_FEATURES), os.unlink, 0
+    left = set[int]()
+
+    def unlink(path, dir_fd=None):
+        if dir_fd is not None and ".set.replaced" in os.readlink(f"/proc/self/fd/{dir_fd}"):
+            left.add(len(left))
+            if len(left) == k:
+                raise KeyboardInterrupt
+        real(path, dir_fd=dir_fd)
+
+    while len(left) == k:
+        k, left = k + 1, set()
+        root = shutil.copytree(made, tmp_path / str(k) / "set")
+        config = cli.parse(DeleteConfig, "handrail-edit delete", [str(root), "--episodes", "0", "--in_place"])
+        with monkeypatch.context() as patch, contextlib.suppress(KeyboardInterrupt):
+            patch.setattr(os, "unlink", unlink)
+            edit(config)
+        if len(left) == k:
+            with pytest.raises(HandrailError, match="an edit was cut short, and is finished now"):
+                edit(config)
+        assert [row["seed"] for row in read_episodes(root)] == [1, 2, 3]
+    assert k > 10

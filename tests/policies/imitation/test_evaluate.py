@@ -288,5 +288,9 @@ def test_a_mode_or_rate_that_the_policy_says_itself_is_taken_or_refused(folder):
     ):
         with pytest.raises(HandrailError, match=rf"\A--policy .*chase: expected {named}\Z"):
             policy_conditions(config(folder, "chase", **other))
+    with pytest.raises(HandrailError, match="--mode my_kit:HAND: expected a policy of it, got ee"):
+        policy_conditions(config(folder, "chase", mode="my_kit:HAND"))
+    with pytest.raises(HandrailError, match="unknown mode 'dierct'"):
+        config(folder, "chase", mode="dierct").check()
     with pytest.raises(HandrailError, match="--fps 5: expected 10 to 100"):
         config(folder, "chase", fps=5).check()

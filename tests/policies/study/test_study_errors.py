@@ -76,6 +76,7 @@ PAIR, TURNED = "[[pairs]]\none = 'ee'\nother = 'direct'\n", "[[pairs]]\none = 'd
         (('["push"]', '["none", "push"]'), "robustness: expected what changes something, got none"),
         (('["filter"]', '["own"]'), "robustness: expected what changes something, got own"),
         (('["push"]', '["push", "blank"]'), "perturbations: expected encoders for blank:1, got none"),
+        (('"direct"]', '"direct", "direct_and_both"]'), "mode both: expected a robot with 2 hands"),
         (('"direct"]', '"direct", "both"]'), "mode both: expected a robot with 2 hands"),
         (("[beside]", PAIR + TURNED + "[beside]"), "pairs: expected two modes each, once"),
         *((("[beside]", f"{PAIR}{entry}\n[beside]"), entry.split()[0]) for entry in FRACTIONS),
