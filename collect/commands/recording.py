@@ -20,6 +20,7 @@ from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interrupts import Interrupts
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
@@ -175,6 +176,12 @@ def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     )
     if config.resume:
         return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
+    known = ROBOTS.get(manifest.robot_type)
+    if known and config.robot.endswith(".toml") and not known.file.samefile(config.robot):
+        words = (
+            f"expected a name of its own in that file, got {known.name!r}: policies would drive that robot"
+        )
+        raise HandrailError(f"--robot {config.robot}: {words}")
     return EpisodeWriter.create(dataset.folder, manifest, config.overwrite)
 
 

@@ -142,4 +142,5 @@ def leader_types() -> Mapping[str, Any]:
         with contextlib.suppress(ImportError):  # of a driver that is not installed
             importlib.import_module(f"lerobot.teleoperators.{module.name}")
     register_third_party_plugins()
-    return teleoperators.TeleoperatorConfig.get_known_choices()
+    known = teleoperators.TeleoperatorConfig.get_known_choices()
+    return {name: each for name, each in known.items() if not name.startswith("handrail_")}

@@ -1,6 +1,7 @@
 """What LeKiwi's host does in every round: take the newest command, stop the base when none comes, answer."""
 
 import json
+import logging
 import math
 from collections import deque
 from collections.abc import Iterable
@@ -120,9 +121,16 @@ class LeKiwiLoop:
 
     def _take(self, message: bytes, now: float, wall: float) -> None:
         command = _parsed(message)
-        if command is None or not self._take_episode(command, now) or not self._body.take(command):
+        if command is None or not _begins_well(command) or not self._body.take(command):
+            if not self.malformed:
+                logging.getLogger(__name__).warning("a command makes no sense: %s", message[:200])
             self.malformed += 1
             return
+        if EPISODE in command and (episode := number(command, EPISODE)) != self._episode:
+            self._episode, self._began = episode, now
+            self._pictures.clear()
+            self._begin(int(number(command, SEED)))
+            self._body.take(command)
         self._heard, self._stopped = now, False
         if message == self._newest:  # said once more
             return
@@ -130,19 +138,6 @@ class LeKiwiLoop:
         self._times.append(now)
         if math.isfinite(age := wall - number(command, SENT)):
             self._ages.append(age)
-
-    def _take_episode(self, command: dict[str, Any], now: float) -> bool:
-        """Begin the episode that a command asks for, if it does; whether that made sense."""
-        if EPISODE not in command:
-            return True
-        episode, seed = number(command, EPISODE), number(command, SEED)
-        if not (math.isfinite(episode) and 0.0 <= seed < 2.0**53):
-            return False
-        if episode != self._episode:
-            self._episode, self._began = episode, now
-            self._pictures.clear()
-            self._begin(int(seed))
-        return True
 
     def _begin(self, seed: int) -> None:
         self._body.reset(seed)
@@ -157,6 +152,12 @@ class LeKiwiLoop:
             self._pictures = {name: b"" if name == lost else _jpeg(self._body, name) for name in cameras}
         header = {"_cams": list(cameras), **self._body.observation()}
         return [json.dumps(header).encode(), *(self._pictures.get(name, b"") for name in cameras)]
+
+
+def _begins_well(command: dict[str, Any]) -> bool:
+    """Return whether a command asks for no episode, or for one that there can be."""
+    episode, seed = number(command, EPISODE), number(command, SEED)
+    return EPISODE not in command or (math.isfinite(episode) and 0.0 <= seed < 2.0**53)
 
 
 def _percentiles(seconds: np.ndarray) -> dict[str, float] | None:

@@ -224,8 +224,9 @@ class HandrailSim(Uncalibrated, Robot):
         """Brake; once the robot rests, time stands still."""
         self.loop.look()
         if not self.loop.rests:
-            nothing = Intent.idle(self._channels, LONG_AGO)
+            nothing, brakes = Intent.idle(self._channels, LONG_AGO), self.loop.tally.brakes
             self._move(replace(nothing, grippers=self.grippers, mode=self.mode.name), EpisodeEvent.PAUSE)
+            self.loop.tally.brakes = brakes  # it was asked for
 
     def _lead(self, positions: FloatArray) -> None:
         """Lead the joints towards positions, (n,) [m, rad], for a period; that is no part of the task."""

@@ -91,6 +91,7 @@ class Drawn:
         movable += tuple(part for part, whole in env.task.parts.items() if whole in movable)
         known = {each.name: each for each in env.model.description.cameras}
         check_known("camera of the robot", names := self.config.session.camera_names, known)
+        env.pictures(names)  # without OpenGL the error is one line here, not in a worker
         cameras = {name: CameraMount.of(known[name], env.model, env.image_size) for name in names}
         return Reads(env.model.description.name, self.config.task, cameras, interface, turns, movable)
 

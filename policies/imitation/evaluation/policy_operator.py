@@ -65,6 +65,8 @@ class PolicyOperator:
         self._unusable = Intent(np.full(size, np.nan), np.ones(size, bool))
         self._period = period
         self.malformed = 0
+        if policy.encoder:
+            policy.encoder.reads.check_robot(env.model)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""

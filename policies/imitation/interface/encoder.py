@@ -27,6 +27,7 @@ from torch import Tensor
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, restated, unknown_name
+from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.typed import Count, Name, decoded
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -35,6 +36,7 @@ from handrail.policies.imitation.interface.relative import POSE, POSITION
 from handrail.policies.imitation.interface.views import PLACED, CameraMount, facing, placed, spread
 
 _SMOOTH = 40.0  # of a saliency: a picture's height over the standard deviation
+_MOVED = 1e-3  # of a camera [m], and of its axes
 _FINEST = 5e-3  # how far something is turned off at least
 _SAID = {POSITION: PLACED, POSE: PLACED + 7}  # numbers that the network says of an object
 OWN = Path(__file__).parents[1] / "encoder" / "weights"
@@ -64,6 +66,15 @@ class Reads:
     def pictures(self) -> dict[Name, tuple[Count, Count]]:
         """Height and width of the pictures [px], by camera."""
         return {name: camera.size for name, camera in self.cameras.items()}
+
+    def check_robot(self, model: RobotModel) -> None:
+        """Check that a robot has the cameras where they were in training."""
+        for camera in model.description.cameras:
+            if mount := self.cameras.get(camera.name):
+                found = CameraMount.of(camera, model, mount.size)
+                if found.on != mount.on or not np.allclose(found.numbers, mount.numbers, atol=_MOVED):
+                    words = f"expected camera {camera.name} where {self.robot} has it"
+                    raise HandrailError(f"encoder: {words}; that of {model.description.name} is elsewhere")
 
     @property
     def sizes(self) -> list[int]:
@@ -147,7 +158,7 @@ class Encoder:
         Args:
             pictures: by camera: 0 to 255, (T, height, width, 3); or 0 to 1, (T, 3, height, width).
         """
-        with torch.inference_mode():
+        with torch.inference_mode(), torch.autocast("cpu", enabled=False):  # LeRobot's use_amp=true
             return self.network(self._tensors(pictures)).numpy()
 
     def saliency(self, pictures: Mapping[str, NDArray[np.uint8]]) -> dict[str, FloatArray]:

@@ -63,6 +63,11 @@ class CameraMount:
         words = "expected one that is fixed to the base or to the tool"
         raise HandrailError(f"camera {camera.name} of {description.name}: {words}")
 
+    @property
+    def numbers(self) -> FloatArray:
+        """Position, axes and slope, (13,)."""
+        return np.array([*self.position, *np.ravel(self.axes), self.slope])
+
     def view(self, pose: RobotPose) -> tuple[FloatArray, FloatArray]:
         """Return where the camera is, c (T, 3) and R (T, 3, 3)."""
         origin, turn = _frame(pose, self.on)

@@ -3,7 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
+from lerobot.configs.policies import PreTrainedConfig
+
 from handrail.controllers.errors import HandrailError, shown
+from handrail.datasets.recording.frames import PICTURE
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -21,8 +24,23 @@ def earlier_policy(config: TrainConfig) -> tuple[Path, PolicyMeta]:
         said, wanted = getattr(earlier, name), getattr(config, name)
         if said != wanted:
             raise HandrailError(f"--init {config.init}: expected a policy with {name} {wanted}, got {said}")
+    if bool(earlier.cameras) != bool(config.encoder):
+        words = "with" if config.encoder else "without"
+        raise HandrailError(f"--init {config.init}: expected a policy {words} an --encoder")
     check_policy_folder(place, asked=[policy_config(config)])
     return place, earlier
+
+
+def check_pictures(place: Path, config: PreTrainedConfig) -> None:
+    """Check that a policy sees the pictures of a config: of the same cameras in the same order and size."""
+    saw, sees = (
+        ", ".join(f"{name.removeprefix(PICTURE)} {list(each.shape)}" for name, each in features.items())
+        for features in (PreTrainedConfig.from_pretrained(place).image_features, config.image_features)
+    )
+    if saw != sees:
+        raise HandrailError(
+            f"policy {str(place)!r}: expected one that sees {sees or 'nothing'}, got {saw or 'nothing'}"
+        )
 
 
 def same_interface(init: str, earlier: PolicyMeta, interface: PolicyInterface) -> PolicyInterface:

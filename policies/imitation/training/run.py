@@ -37,6 +37,7 @@ from handrail.policies.imitation.interface.encoder import Encoder
 from handrail.policies.imitation.interface.steps import Completion, with_steps, without_steps
 from handrail.policies.imitation.interface.trained import check_numbers, load_weights
 from handrail.policies.imitation.training.curve import Curve, read_sums, write_sums
+from handrail.policies.imitation.training.earlier import check_pictures
 from handrail.policies.imitation.training.memory import MemoryDataset
 
 _WHOLE_MODEL = (DistributedType.NO, DistributedType.MULTI_CPU, DistributedType.MULTI_GPU)  # in every process
@@ -80,6 +81,7 @@ class TrainingRun:
         if weights is None:
             around = make_pre_post_processors(described, dataset_stats=stats)
         else:
+            check_pictures(weights, policy.config)
             device = {"device_processor": {"device": self._accelerator.device.type}}
             around = make_pre_post_processors(described, str(weights), preprocessor_overrides=device)
             load_weights(policy, weights)  # LeRobot leaves out what does not fit

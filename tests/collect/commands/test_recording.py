@@ -4,7 +4,7 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from command_helpers import ran
+from command_helpers import ran, refused
 
 from handrail.collect.commands.account import next_commands
 from handrail.collect.commands.record import record
@@ -13,6 +13,7 @@ from handrail.collect.commands.shared import record_shard
 from handrail.collect.config import DatasetConfig, DriveConfig, FoundDatasetConfig, RecordConfig
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.reading.reader import read_episodes
 
 PLAIN = DriveConfig(physics=False)
@@ -69,6 +70,7 @@ def test_no_episode_is_recorded_again_after_an_edit(tmp_path):
     )
     with pytest.raises(HandrailError, match="expected the folder of the command, which all computers have"):
         record_shard(config, part, 4, 6)
+    part.parent.mkdir()
     (part.parent / "plan.json").touch()
     record_shard(config, part, 4, 6)
     ran(once, *flags, 6, "--resume")
@@ -118,3 +120,16 @@ def test_where_nothing_can_be_written_it_says_so(tmp_path):
     (tmp_path / "outputs").write_text("a file")
     with pytest.raises(HandrailError, match="is a file"):
         opened()
+
+
+def test_a_robot_s_file_has_a_name_of_its_own(tmp_path):
+    """A policy knows its robot by that name."""
+    own, mine = ROBOTS.find("ridgeback_ur10").file, tmp_path / "mine.toml"
+    shutil.copy(own, mine)
+    flags = ("--task", "reach", "--time_limit", "0.2", "--no_physics", "--dataset.num_episodes", 1)
+    refused(tmp_path / "set", *flags, "--robot", mine, told="expected a name of its own in that file, got")
+    assert not (tmp_path / "set").exists()
+    ran(tmp_path / "set", *flags, "--robot", own)
+    mine = tmp_path / "other.toml"
+    mine.write_text(own.read_text().replace('\nname = "ridgeback_ur10"', '\nname = "mine"'))
+    ran(tmp_path / "other", *flags, "--robot", mine)

@@ -75,15 +75,18 @@ def test_the_base_stops_when_no_command_comes_and_the_arm_stays():
         {**AHEAD, "theta.vel": "much"},
         {**AHEAD, "arm_elbow_joint.pos": math.inf},
         {**AHEAD, EPISODE: 1.0, SEED: math.nan},
+        {**AHEAD, EPISODE: 1.0, SEED: 7.0, "x.vel": math.nan},
     ],
 )
-def test_nonsense_moves_nothing_and_is_no_sign_of_life(nonsense):
+def test_nonsense_moves_nothing_and_is_no_sign_of_life(nonsense, caplog):
     hosted = Hosted()
     hosted.go(0.5, AHEAD)
     said = hosted.go(1.5, nonsense)
     assert abs(said["x.vel"]) < 1e-3
     assert hosted.loop.stops == 1
     assert hosted.loop.malformed == 45
+    assert len(hosted.loop.episodes) == 1
+    assert [each.message.partition(":")[0] for each in caplog.records] == ["a command makes no sense"]
 
 
 def test_a_seed_begins_an_episode_once():

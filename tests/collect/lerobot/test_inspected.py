@@ -17,7 +17,7 @@ FPS = 20
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """One episode to the goal; one that begins when the goal is still reached, and ends in a new scene."""
+    """One to the goal, one that begins with it reached, and one just before; both end in a new scene."""
     folder = tmp_path_factory.mktemp("lerobot")
     seen: list[list[dict]] = [[], []]
     with steered(folder) as (robot, teleop):
@@ -28,6 +28,9 @@ def recorded(tmp_path_factory):
         for _ in range(10):
             seen[1].append(robot.get_observation())
             robot.send_action(robot.action.still() | {NEXT: float(len(seen[1]) == 1)})
+    seen.append([row | {"success": float(number > 1)} for number, row in enumerate(seen[1])])
+    for number, row in enumerate(seen[2]):
+        row["scene"] = seen[0][0]["scene"] + (number > 3)
     seen[1][4]["contacts"], seen[1][5]["contacts"] = 2.0, 1.0
     names = list(seen[0][0])
     features = {
@@ -47,8 +50,8 @@ def test_success_distance_and_contacts_are_those_of_the_state(recorded):
     root, seen = recorded
     assert HandrailSim.name == ROBOT
     assert seen[1][0]["success"] == 1.0  # of the first episode's scene
-    first, second = summarize(root)
-    assert (first.success, second.success) == (True, False)
+    first, second, third = summarize(root)
+    assert (first.success, second.success, third.success) == (True, False, False)
     assert (first.contacts, second.contacts) == (0, 2)
     for summary, episode in ((first, seen[0]), (second, seen[1])):
         nearest = min(row["distance"] for row in episode)
@@ -61,7 +64,7 @@ def test_success_distance_and_contacts_are_those_of_the_state(recorded):
     ]
     assert point_entries(("x.pos", "tool.x.pos", "tool.y.pos", "tool.z.pos")) == [1, 2, 3]
     shown = command(root, name="inspect")
-    assert "2 episodes, 1 succeeded" in shown.stdout
+    assert "3 episodes, 1 succeeded" in shown.stdout
 
 
 def test_another_robot_s_state_means_what_its_names_mean_there(recorded, tmp_path):

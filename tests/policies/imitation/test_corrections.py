@@ -202,6 +202,7 @@ def test_a_training_goes_on_from_an_earlier_policy(takeovers, tmp_path):
         ({"actions": "intent"}, "--init .*: expected a policy with actions intent, got realised"),
         ({"base_pose": False}, "--init .*: expected a policy of the dataset's base pose, got True"),
         ({"policy_options": ("chunk_size=6", "n_action_steps=2")}, "policy .*size mismatch"),
+        ({"encoder": "ridgeback_ur10-reach"}, "--init .*: expected a policy with an --encoder"),
         ({"init": "nowhere"}, "policy 'nowhere': expected a checkpoint"),
     ],
 )
