@@ -127,14 +127,14 @@ class Display:
         self, spawn: bool = False, web: bool = False, save: str = "", say: Callable[[str], None] = print
     ) -> None:
         rr = imported("rerun", "--display_data, _web, _save", "rerun", "display")
-        self._rr, self._save, self._say = rr, save, say
+        self._rr, self._save, self._say = rr, os.path.expanduser(save), say
         self._viewer: Viewer | None = None
         self._stream: Any = None
         self._off, self._sent = False, 0.0
         self._drawing = Drawing(rr)
         rr.init("handrail")
-        if save:
-            rr.save(os.path.expanduser(save))
+        if self._save:
+            rr.save(self._save)
         if spawn or web:
             self._open_viewer(web)
 

@@ -249,7 +249,7 @@ def test_two_never_draw_one_dataset(tmp_path):
 
 def test_a_robot_whose_description_is_elsewhere_now_is_told(tmp_path):
     before, now, root = tmp_path / "then.toml", tmp_path / "now.toml", tmp_path / "set"
-    before.write_text(ROBOTS["lekiwi"].file.read_text())
+    before.write_text(ROBOTS["lekiwi"].file.read_text().replace('\nname = "lekiwi"', '\nname = "mine"'))
     record(root, "--robot", before, episodes=1)
     before.rename(now)
     load_model.cache_clear()  # as in another process

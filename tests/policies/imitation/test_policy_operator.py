@@ -99,6 +99,7 @@ class Looks:
             objects=[("cube", ("x", "y", "z"), 0)],
             turns={},
             movable=("cube",),
+            check_robot=lambda model: None,
             interface=SimpleNamespace(environment_names=("cube.x", "cube.y", "cube.z")),
         )
 
