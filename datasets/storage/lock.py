@@ -48,7 +48,7 @@ class FolderLock:
             if mine:
                 self._path.unlink()
         if mine:
-            with contextlib.suppress(OSError):  # not before it is closed, for NFS; something else is in it
+            with contextlib.suppress(OSError):  # something else is in it (NFS: until the file is closed)
                 self._path.parent.rmdir()
 
     def moved(self, staging: Path) -> None:
