@@ -9,7 +9,7 @@ from handrail.collect.devices.device import DeviceInput
 from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.follower import Follower
 from handrail.collect.operators.operator import EpisodeEvent, View
-from handrail.collect.operators.person.inputs import ASKS, Ask, Input
+from handrail.collect.operators.person.inputs import ASKS, STILLS, Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
@@ -119,9 +119,12 @@ class LocalPerson:
             source.close()
 
     def _heard(self) -> tuple[DeviceInput | None, DeviceInput | None]:
-        """Do what was pressed; return what the main device says, and the one with the dead-man."""
+        """Do what was pressed, STOP first; return the input of the main device, and of the dead-man's."""
         said = {source: source.input(self._steered) for source in self._sources}
-        for action in (action for _, actions in said.values() for action in actions):
+        asked = [action for _, actions in said.values() for action in actions]
+        if "stop" in asked:  # what is heard with it may have been pressed before it
+            asked = ["stop", *(each for each in asked if each in STILLS)]
+        for action in asked:
             self._do(action)
         self._card.trouble = self._main.trouble or self._moving.trouble
         return said[self._main][0], said[self._moving][0]

@@ -162,6 +162,29 @@ def test_the_stop_and_its_release(device):
     assert isinstance(driven.act(), Intent)
 
 
+@pytest.mark.parametrize(
+    ("pad", "keys"), [(["b"], ["enter", "enter"]), (["b"], ["enter"]), (["b", "start"], [])]
+)
+def test_what_is_heard_with_a_stop_does_not_undo_it(pad, keys):
+    """It may have been pressed before it: devices are heard one after the other, buttons in their order."""
+    driven = Driven("gamepad", beside="keyboard")
+    driven.begin()
+    driven.main.presses, driven.beside.presses = list(pad), list(keys)
+    assert driven.act() is EpisodeEvent.PAUSE
+    assert driven.person.phase is Phase.STOPPED
+    driven.person.ask(Ask("stop", False))
+    driven.main.presses, driven.beside.presses = list(pad), list(keys)
+    assert driven.local.between() is EpisodeEvent.PAUSE
+
+
+def test_an_episode_that_is_judged_with_a_stop_is_over():
+    driven = Driven("gamepad", beside="keyboard")
+    driven.begin()
+    driven.main.presses, driven.beside.presses = ["b"], ["right"]
+    assert driven.act() is EpisodeEvent.SUCCESS
+    assert driven.person.phase is Phase.STOPPED
+
+
 @pytest.mark.parametrize("beside", ["", "keyboard"])
 def test_a_stop_is_heard_though_its_device_is_gone_since(beside):
     driven = Driven("gamepad", beside=beside)
