@@ -65,10 +65,10 @@ class SpaceMouse:
             ) from error
         self._hid.set_nonblocking(1)  # or a patience of 0 would wait for the next report
 
-    def read(self) -> DeviceInput:
-        """Return its axes and buttons."""
+    def read(self, most: int = _MOST_REPORTS) -> DeviceInput:
+        """Return its axes and buttons, with so many new reports at most."""
         presses: list[str] = []
-        for number in range(_MOST_REPORTS):
+        for number in range(most):
             report = self._hid.read(64, 0 if number else _WAIT)
             presses += self._take(bytes(report)) if report else []
             if presses or not report:  # what was pressed is said before a reading that may fail
@@ -125,8 +125,9 @@ class SpaceMice:
 
     def read(self) -> DeviceInput:
         """Return the axes and buttons of both."""
-        one, *others = (cap.read() for cap in self._open)
-        for each in others:
+        one = self._open[0].read()
+        for cap in self._open[1:]:
+            each = cap.read(0 if one.presses else _MOST_REPORTS)  # which may fail: a press is said before
             moved = {_OTHER + name: value for name, value in each.deflections.items()}
             presses = (*one.presses, *(_OTHER + name for name in each.presses))
             time, attended = min(one.time, each.time), one.attended and each.attended

@@ -165,3 +165,16 @@ def test_one_cap_that_falls_silent_or_is_gone_is_doubt_of_both(mice, clock, sile
     caps[silent].plugged = False
     with pytest.raises(OSError, match="read error"):
         made.read()
+
+
+def test_a_press_on_the_first_cap_is_said_though_the_second_is_gone(mice):
+    """As of one cap; what the second one said before holds until it is asked again."""
+    made, caps = mice
+    caps[1].reports = [FORWARD_CAP]
+    held = made.read().deflections
+    caps[0].reports, caps[1].plugged = [bytes.fromhex("0301000000")], False
+    said = made.read()
+    assert said.presses == ("button_1",)
+    assert held.items() <= said.deflections.items()
+    with pytest.raises(OSError, match="read error"):
+        made.read()
