@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.client_config import CLIENTS, ClientConfig
+from handrail.collect.clock import time_with_sleep
 from handrail.collect.flags import check_names
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
 from handrail.collect.operators.operator import EpisodeEvent
@@ -62,7 +63,7 @@ class Link:
         model: RobotModel,
         period: float,
         simulated: bool = False,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time_with_sleep,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._client, self._name, self.model, self.period = client, name, model, period

@@ -9,7 +9,6 @@
 
 import logging
 import math
-import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -23,6 +22,7 @@ from lerobot.processor import ProcessorStepRegistry, RobotActionProcessorStep, R
 from lerobot.processor.converters import robot_action_observation_to_transition, transition_to_robot_action
 from msgspec import Meta
 
+from handrail.collect.clock import time_with_sleep
 from handrail.collect.processor.partial_intent import PartialIntent
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
@@ -99,7 +99,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
     """Values of `MpcSettings` that differ from its defaults."""
     timeout: Positive = DEAD_MAN_TIME
     """Age from which an observation is stale [s]."""
-    clock: Callable[[], float] = field(default=time.monotonic, repr=False)
+    clock: Callable[[], float] = field(default=time_with_sleep, repr=False)
     """[s]; not saved."""
     counts: Counter[str] = field(default_factory=Counter, init=False, repr=False)
     """How often it braked, and why; `late`: updates that came later than the masked MPC certifies."""
@@ -188,7 +188,7 @@ def mpc_pipeline(step: MaskedMpcStep) -> Pipeline:
     )
 
 
-def load_pipeline(folder: str | Path, clock: Callable[[], float] = time.monotonic) -> Pipeline:
+def load_pipeline(folder: str | Path, clock: Callable[[], float] = time_with_sleep) -> Pipeline:
     """Return a pipeline of the step that `save_pretrained` wrote into a folder.
 
     LeRobot's loader imports whatever a file names; here the file says the settings of this step alone.

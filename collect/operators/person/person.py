@@ -18,6 +18,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from handrail.collect.clock import time_with_sleep
 from handrail.collect.operators.modes import TeleopMode, mode_of_mask
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import STILLS, Ask, Input
@@ -82,6 +83,7 @@ class Person:
         self._quits = False  # once the episode that was judged is saved
         self._armed = False  # everything was let go once since the robot had to brake
         self._begun = False  # Start was pressed in this episode
+        self._slept = _slept()  # so far, as is known [s]
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
@@ -154,13 +156,16 @@ class Person:
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
+        if (slept := _slept()) > self._slept + DEAD_MAN_TIME:  # who wakes a computer may not see the robot
+            self._slept = slept
+            self.lose()
         if self._undone:
             self._find(view)
         if self._event is not None:
             event, self._event = self._event, None
             self._undone = event is EpisodeEvent.UNDO
             return event
-        driven = self._is_driven()
+        driven = self.inputs is not None and self.inputs.on and self.age <= DEAD_MAN_TIME
         if self.phase is Phase.DRIVING and not driven:
             self.phase, self._armed = self._lost, False
         elif self.phase is Phase.LOST and driven and self._armed:
@@ -190,9 +195,6 @@ class Person:
         self.closed, self._grips = list(view.grippers or [0.0] * len(self.meaning.hands)), ()
         self._undone = False
 
-    def _is_driven(self) -> bool:
-        return self.inputs is not None and self.inputs.on and self.age <= DEAD_MAN_TIME
-
     def _pick_axis(self, inputs: Input) -> None:
         """Take the axis that is moved most, once the one before was let go; another one is a switch."""
         owned = np.abs(inputs.axes) * self.meaning.mask(self.setting)
@@ -212,3 +214,8 @@ class Person:
         elif self._begun or event.drops:
             self._event = event
             self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.PAUSED
+
+
+def _slept() -> float:
+    """Return how long this computer has slept [s]; too little where it is busy between the two readings."""
+    return time_with_sleep() - time.monotonic()

@@ -1,11 +1,15 @@
 """A robot of LeRobot's as a whole body: where it is expected, whatever its odometry says."""
 
+import inspect
 import math
+import time
 
 import numpy as np
 import pytest
 from processor_helpers import PERIOD, Drive
 
+from handrail.collect.lekiwi.link import Link
+from handrail.collect.processor.mpc_step import MaskedMpcStep
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
 from handrail.controllers.robot.model import load_model
@@ -84,3 +88,10 @@ def test_a_base_that_is_too_fast_at_a_reset_counts_as_its_limit():
     drive.robot.twist = np.array([2.0 * fastest, 0.0, 0.0])
     drive.go({"base.vx": fastest, "base.vy": 0.0, "base.wz": 0.0})
     assert 0.8 * fastest < drive.robot.twist[0] <= fastest + 1e-9
+
+
+def test_clocks_of_a_robot_count_the_sleep_of_the_computer(monkeypatch):
+    """Law: a sleep is a halt, in which the robot's watchdog stops the base."""
+    monkeypatch.setattr(time, "clock_gettime", lambda clock: 3600.0)
+    clocks = [inspect.signature(made).parameters["clock"].default for made in (MaskedMpcStep, Link)]
+    assert [clock() for clock in clocks] == [3600.0, 3600.0]

@@ -1,5 +1,6 @@
 """Laws: only a fresh input of a page that is seen moves the robot; after a brake all is let go first."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent, View
+from handrail.collect.operators.person import person
 from handrail.collect.operators.person.inputs import Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.controllers.interface.controller import State
@@ -87,6 +89,24 @@ def test_doubtful_input_pauses_until_all_is_let_go(operator, trouble):
     drive(operator)
     again = operator.act(view())
     assert isinstance(again, Intent) == (trouble != "gone")  # a page that was gone has to press Start
+
+
+@pytest.mark.parametrize("supervises", [False, True])
+def test_after_a_sleep_of_the_computer_only_start_goes_on(supervises, monkeypatch):
+    """All clocks stood still with it: the newest input is as new as before."""
+    slept = [5.0]
+    monkeypatch.setattr(person, "time_with_sleep", lambda: time.monotonic() + slept[0])
+    made = Person(MODEL, fitting(MODES, 1), "ee", lambda: CLOCK[0], supervises)
+    made.reset(view(), np.random.default_rng(0))
+    begin(made)
+    drive(made, ee_vx=1.0)
+    assert isinstance(made.act(view()), Intent)
+    slept[0] += 3600.0
+    drive(made, ee_vx=1.0)
+    assert made.act(view()) is EpisodeEvent.PAUSE
+    drive(made)
+    assert made.act(view()) is EpisodeEvent.PAUSE
+    begin(made)
 
 
 def test_the_stop_holds_until_it_is_released_and_start_is_pressed(operator):
