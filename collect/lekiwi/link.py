@@ -104,7 +104,8 @@ class Link:
         sent = self.body.sent
         self._wait(0.5)
         with restated(f"robot {self._name}: cannot be reached"), self._lock:
-            self._client.send_action(self._action)
+            if self._clock() <= self._due:  # else the robot may stand meanwhile
+                self._client.send_action(self._action)
         self._wait(0.5)
         self._catch_up() if late else self._listen()
         return sent

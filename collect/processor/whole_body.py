@@ -139,6 +139,8 @@ class WholeBody:
     def pass_time(self, now: float) -> None:
         """Take note of how far the base was sent until now [s], said later: `sent - said`, 0 after a rest."""
         passed = _passed(self._time, now, _HOLD)
+        if math.inf > now - self._sent_at > _HOLD:  # a watchdog stops the base, if no reading differs
+            self._gate.velocity[: self._b] = 0.0
         silent = now - self._heard > _SILENT * self._period
         self._rested = 0.0 if self._twist.any() or silent else self._rested + passed
         going = moved(self._expected(), self._twist, passed) - self._base
@@ -198,7 +200,7 @@ class WholeBody:
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)
         if reading.pose is not None:
             self._base = reading.pose
-        if before is None and not self._rests:
+        if math.inf > now - self._sent_at > _HOLD or (before is None and not self._rests):
             twist = turned(reading.twist, self._base[2])
             within = np.clip(twist, -self._fastest_base, self._fastest_base)
             self._gate.velocity[: self._b] = within[: self._b]

@@ -218,6 +218,18 @@ def test_messages_that_waited_while_the_loop_halted_are_read_first():
     link.close()
 
 
+def test_a_command_is_not_said_again_after_a_halt():
+    """Its robot's watchdog has stopped the base."""
+    client = PlayedClient()
+    link = played(client)
+    link.exchange(())
+    sleep, client.sent = client.sleep, []
+    link._sleep = lambda seconds: sleep(seconds + 3.0)
+    link.exchange(())
+    assert len(client.sent) == 1
+    link.close()
+
+
 def test_the_drive_home_brakes_while_it_is_stopped_and_stays_where_the_recording_ends():
     client, driven = PlayedClient(), Driven("gamepad")
     link, q = played(client), HOME.copy()

@@ -90,6 +90,28 @@ def test_a_base_that_is_too_fast_at_a_reset_counts_as_its_limit():
     assert 0.8 * fastest < drive.robot.twist[0] <= fastest + 1e-9
 
 
+@pytest.mark.parametrize("on", [0.0, 1.0])
+def test_after_a_halt_a_base_goes_on_from_what_it_measures(on):
+    """Law: a watchdog has stopped it, or none has; either way what is sent keeps the limits."""
+    drive, still = Drive(robot="lekiwi", units="lekiwi"), {"base.vx": 0.0, "base.vy": 0.0, "base.wz": 0.0}
+    drive.go(still | {"base.vx": 0.2}, 2.0)
+    drive.clock.now += 3.0
+    drive.robot.twist = before = on * drive.robot.twist
+    assert abs(drive.go(still)["x.vel"] - before[0]) <= PERIOD * DESCRIPTION.limits.acceleration[0] + 1e-9
+
+
+def test_a_stop_after_a_halt_moves_no_base_that_its_watchdog_has_stopped():
+    units = robot_units("lekiwi", DESCRIPTION)
+    body = WholeBody(MODEL, units, PERIOD)
+    rest = units.action(DESCRIPTION.home[3:], np.zeros(5), np.zeros(3), (0.0,))
+    for period in range(40):
+        body.observe(dict(rest), period * PERIOD)
+        said = body.send(np.append(np.where(np.arange(MODEL.size) < 1, 0.2, 0.0), 0.0))
+    assert said["x.vel"] > 0.1
+    body.pass_time(40 * PERIOD + 3.0)
+    assert body.send(())["x.vel"] == 0.0
+
+
 def test_clocks_of_a_robot_count_the_sleep_of_the_computer(monkeypatch):
     """Law: a sleep is a halt, in which the robot's watchdog stops the base."""
     monkeypatch.setattr(time, "clock_gettime", lambda clock: 3600.0)
