@@ -40,9 +40,10 @@ class Planner(Protocol):
 class ThreadedPlanner:
     """Plans in a thread of its own, so that no inference delays the loop; what is sent goes by time.
 
-    A plan begins at the moment that it was made for; what of it lies in the past is left out. After its last
-    period it is stale, and so is the intent of a policy that has no plan yet: the robot brakes. An intent's
-    `raw.age` is that of the plan's beginning.
+    A plan begins at the moment that it was made for; what of it lies in the past is left out. Its last intent
+    counts as new for a period, since a plan of one intent comes a period late; it then goes on until it is
+    stale (0.25 s after its own time), and the robot brakes. So it does while a policy has no plan yet. An
+    intent's `raw.age` is that of the plan's beginning.
 
     Args:
         planner: used by the thread alone.
