@@ -160,9 +160,9 @@ class Hub:
         page.say("error", error=str(error))
 
     def _take(self, page: PageSocket, said: Message, now: float) -> None:
-        if isinstance(said, Stop):
-            return  # it was heard first
-        if isinstance(said, Ask) and said.what in LEASE:
+        if isinstance(said, Stop):  # it was passed on first
+            page.say("heard", press=said.press)
+        elif isinstance(said, Ask) and said.what in LEASE:
             drove = self._lease.holder
             (self._lease.take if said.what == "take" else self._lease.give)(page.name)
             if self._lease.holder != drove:

@@ -4,7 +4,7 @@
 drive    seq, echo, on, device, grip, axes (one deflection a channel), view, targets (of the arm's joints)
                                  latest wins, many a second
 ask      what, value            each counts, once
-         stop, true, press      STOP; comes again, with the same number, until a frame says that it is so
+         stop, true, press      STOP; again, with the same number, until it was heard and a frame says so
 answer   card, item, value      to a question on a card; comes again until the card says that it is kept
 ```
 """

