@@ -220,11 +220,12 @@ def test_messages_that_waited_while_the_loop_halted_are_read_first():
 
 def test_a_command_is_not_said_again_after_a_halt():
     """Its robot's watchdog has stopped the base."""
-    client = PlayedClient()
+    client, halt = PlayedClient(), [0.0]
+    sleep = client.sleep
+    client.sleep = lambda seconds: sleep(seconds + halt[0])
     link = played(client)
     link.exchange(())
-    sleep, client.sent = client.sleep, []
-    link._sleep = lambda seconds: sleep(seconds + 3.0)
+    halt[0], client.sent = 3.0, []
     link.exchange(())
     assert len(client.sent) == 1
     link.close()
