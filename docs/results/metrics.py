@@ -2,10 +2,11 @@
 
 `python docs/results/metrics.py STUDY.json …`. Spearman's ρ of a metric of a recording and the success of
 the policy that learnt from it, over modes and draws of a study, a task and an amount of data; ρ is the mean
-over these. Its interval: 95 % of ρ over modes drawn anew with their draws. p: how often some metric has a
-larger |ρ| where success is given to modes by chance, so that it holds for all metrics together. Modes are
-chosen once for all groups: amounts of a task share recordings. Explores: modes differ in more than one
-metric, and m of them give no p below 1 / m!, nor a sure interval.
+over these, without those in which the metric or success does not vary. Its interval: 95 % of ρ over modes
+drawn anew with their draws. p: how often some metric has a larger |ρ| where success is given to modes by
+chance, so that it holds for all metrics together. Modes are chosen once for all groups: amounts of a task
+share recordings. Explores: modes differ in more than one metric, and m of them give no p below 1 / m!, nor a
+sure interval.
 """
 
 import json
@@ -46,9 +47,9 @@ def read(files):
 
 
 def correlation(metric, success):
-    """Return Spearman's ρ of two tables, (modes, draws) each; 0 where nothing varies."""
+    """Return Spearman's ρ of two tables, (modes, draws) each; NaN where one does not vary."""
     if not (np.ptp(metric) > 0.0 and np.ptp(success) > 0.0):
-        return 0.0
+        return np.nan
     one, other = (ranks - ranks.mean() for ranks in map(stats.rankdata, (metric.ravel(), success.ravel())))
     return float(one @ other / np.sqrt((one @ one) * (other @ other)))
 
@@ -56,29 +57,45 @@ def correlation(metric, success):
 def main(*files):
     """Print a line for each metric, the one that goes best with success first."""
     groups, rng = read(files), np.random.default_rng(0)
+    if not groups:
+        sys.exit("expected three modes with all draws of a task, got fewer")
     every = [recorded for group in groups.values() for recorded, _ in group.values()]
     names = sorted(set.intersection(*(set(draw) for recorded in every for draw in recorded)) - ALONE)
     modes = sorted({mode for group in groups.values() for mode in group})
 
-    def mean(measured, succeeded):
-        """Return each metric's mean ρ: modes whose metrics count, and those whose success stands for it."""
+    def correlations(measured, succeeded):
+        """Return each group's ρ: modes whose metrics count, and those whose success stands for it."""
         every = []
         for group in groups.values():
             first, second = ([mode for mode in order if mode in group] for order in (measured, succeeded))
             success = np.array([group[mode][1] for mode in second])
             metrics = np.array([[[row[name] for name in names] for row in group[mode][0]] for mode in first])
-            every.append([correlation(metrics[..., k], success) for k in range(len(names))] if first else 0.0)
-        return np.mean(np.broadcast_arrays(*every, np.zeros(len(names)))[:-1], axis=0)
+            each = [correlation(metrics[..., k], success) if first else np.nan for k in range(len(names))]
+            every.append(each)
+        return np.array(every)
 
+    def mean(measured, succeeded):
+        found = correlations(measured, succeeded)
+        with np.errstate(invalid="ignore"):
+            return np.nansum(found, axis=0) / np.isfinite(found).sum(axis=0)
+
+    counts = np.isfinite(correlations(modes, modes)).sum(axis=0)
+    if not counts.any():
+        sys.exit("expected success that differs between policies, got the same of all")
+    names = [name for name, count in zip(names, counts, strict=True) if count]
+    counts = counts[counts > 0]
     found = mean(modes, modes)
     again = np.array([mean(order, order) for order in rng.choice(modes, (TIMES, len(modes)))])
     chance = np.array([np.abs(mean(modes, rng.permutation(modes))).max() for _ in range(TIMES)])
-    low, high = np.quantile(again, (0.025, 0.975), axis=0)
+    low, high = np.nanquantile(again, (0.025, 0.975), axis=0)
     policies = sum(len(success) for group in groups.values() for _, success in group.values())
     print(f"{len(groups)} groups, {policies} policies")
     for k in np.argsort(-np.abs(found)):
         p = (1 + np.sum(chance >= abs(found[k]) - 1e-9)) / (1 + TIMES)
-        print(f"{names[k]}: {found[k]:+.2f} ({low[k]:+.2f} to {high[k]:+.2f}), p over all metrics {p:.3f}")
+        some = f" ({counts[k]} of {len(groups)} groups)" * bool(counts[k] < len(groups))
+        print(
+            f"{names[k]}: {found[k]:+.2f} ({low[k]:+.2f} to {high[k]:+.2f}), p over all metrics {p:.3f}{some}"
+        )
 
 
 if missing := [name for name in sys.argv[1:] if not Path(name).is_file()]:
