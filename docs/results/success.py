@@ -2,7 +2,7 @@
 
 `python docs/results/success.py FIGURE.png ARCHIVE.tar.xz …`. A point is a mode with an amount of data in one
 study: the mean over draws, and 95 % by Student's t over these, whose variance is at least that of a draw's
-rollouts by chance. Amounts of the same recordings are joined. It also prints the points.
+rollouts by chance; one draw has none. Amounts of the same recordings are joined. It also prints the points.
 """
 
 import json
@@ -50,6 +50,8 @@ def point(draws):
 def main(figure, *archives):
     """Draw one panel a task, and print a line for each point."""
     studies = [read(archive) for archive in archives]
+    if not all(studies):
+        sys.exit("expected undisturbed policies of realised motion, got none")
     tasks, modes = (list(dict.fromkeys(key[k] for each in studies for key in each)) for k in (0, 1))
     drawn = Figure((5.2 * len(tasks), 4.2), layout="constrained")
     for axes, task in zip(np.atleast_1d(drawn.subplots(1, len(tasks), sharey=True)), tasks, strict=True):
@@ -63,7 +65,11 @@ def main(figure, *archives):
                 axes.errorbar(beside, y, (y - low, high - y), label=name, **style)
                 for minutes, share, *ends, count in points:
                     span = " to ".join(f"{end:.1f}" for end in ends)
-                    print(f"{task}, {mode}: {minutes:.1f} min {share:.1f} % ({span}), {count} draws")
+                    sure = f"({span}), {count} draws" if count > 1 else "(one draw)"
+                    print(f"{task}, {mode}: {minutes:.1f} min {share:.1f} % {sure}")
+        for mark, archive in zip(cycle(MARKS), archives if len(archives) > 1 else (), strict=False):
+            name = Path(archive).name.removesuffix(".tar.xz")
+            axes.plot([], [], mark, color="0.5", ms=5, label=name)
         axes.set(title=task.replace("_", " "), xlabel="operator's time [min]", ylim=(-3, 103), xscale="log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
         axes.xaxis.set_major_formatter("{x:g}")
