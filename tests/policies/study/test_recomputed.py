@@ -89,24 +89,62 @@ def test_the_metric_that_goes_with_success_is_named_first(tmp_path, amounts):
     assert other.startswith("other: ")
 
 
+def test_a_group_without_differences_leaves_the_others_what_they_say(tmp_path):
+    """There ρ is not defined; a metric that never varies is left out."""
+    every, success = (
+        list(product(("reach", "pick_place"), "abcd", range(3))),
+        {"a": 0, "b": 1, "c": 2, "d": 3},
+    )
+    jobs = {
+        f"collect/{task}/{mode}/{draw}": {"result": {"quality": {"telling": -success[mode], "constant": 1.0}}}
+        for task, mode, draw in every
+    }
+    conditions = [
+        {
+            "task": task,
+            "label": mode,
+            "treatment": "",
+            "draws": {str(draw): 1.0 if task == "reach" else success[mode] / 4 for draw in range(3)},
+        }
+        for task, mode in product(("reach", "pick_place"), "abcd")
+    ]
+    study = {"design": {"draws": 3}, "jobs": jobs, "conditions": conditions}
+    (tmp_path / "study.json").write_text(json.dumps(study))
+    count, line = said_by(RESULTS / "metrics.py", tmp_path / "study.json").splitlines()
+    assert count == "2 groups, 24 policies"
+    assert line.startswith("telling: -1.00 (-1.00 to -1.00), p over all metrics ")
+    assert line.endswith(" (1 of 2 groups)")
+
+
 def share_after(mode, minutes):
     return 1 / (1 + (6.0 * {"quick": 1.0, "slow": 2.0}[mode] / minutes) ** 2)
 
 
-@pytest.fixture
-def archive(tmp_path):
-    """An archive of a study in which a mode needs twice the minutes."""
-    rng = np.random.default_rng(0)
-    for mode, draw, minutes in product(("quick", "slow"), range(4), (3, 5, 10, 20)):
-        rollouts = [{"success": bool(rng.random() < share_after(mode, minutes))} for _ in range(200)]
+def packed(folder, cells, rollouts=200):
+    """Write an archive of a study: of (task, mode, draw, minutes), how many of the rollouts succeed."""
+    for (task, mode, draw, minutes), successes in cells.items():
+        rows = [{"success": k < successes} for k in range(rollouts)]
         learnt = {"operator_time": 60.0 * minutes, "episodes": minutes * (12.0 if mode == "quick" else 6.0)}
-        file = tmp_path / f"evaluations/reach/{mode}/{draw}/nominal/realised-time-{minutes}.json"
+        file = folder / f"evaluations/{task}/{mode}/{draw}/nominal/realised-time-{minutes}.json"
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps({"arms": {mode: [{"trained_on": learnt, "rollouts": rollouts}]}}))
-    path = tmp_path / "study.tar.xz"
+        file.write_text(json.dumps({"arms": {mode: [{"trained_on": learnt, "rollouts": rows}]}}))
+    path = folder / "study.tar.xz"
     with tarfile.open(path, "w:xz") as file:
-        file.add(tmp_path / "evaluations", "evaluations")
+        file.add(folder / "evaluations", "evaluations")
     return path
+
+
+@pytest.fixture
+def cells():
+    """Successes of a study in which a mode needs twice the minutes."""
+    rng = np.random.default_rng(0)
+    every = product(("quick", "slow"), range(4), (3, 5, 10, 20))
+    return {("reach", *each): int(rng.binomial(200, share_after(each[0], each[2]))) for each in every}
+
+
+@pytest.fixture
+def archive(tmp_path, cells):
+    return packed(tmp_path, cells)
 
 
 def said_by(*script):
@@ -121,6 +159,48 @@ def test_a_mode_that_needs_twice_the_minutes_is_said_to(archive):
         ratio, low, high = ratios[name]
         assert low < true < high
         assert ratio == pytest.approx(true, rel=0.15)
+    assert told.count("; highest success quick 91 %, slow 75 %") == 2
+    assert "parallel" not in told
+    assert "beyond" not in told
+
+
+@pytest.mark.parametrize(
+    ("quick", "slow", "said"),
+    [
+        ((50, 50, 50), (50, 50, 50), ": success does not clearly rise with it, no ratio"),
+        ((45, 45, 45), (25, 25, 25), ": success does not clearly rise with it, no ratio"),
+        ((45, 40, 35), (40, 35, 30), ": success does not clearly rise with it, no ratio"),
+        ((20, 35, 49), (5, 15, 25), "lines are not parallel, 4 draws; highest success quick 98 %, slow 50 %"),
+        ((30, 35, 40), (15, 20, 25), ", beyond the amounts driven, 4 draws"),
+    ],
+)
+def test_a_mode_that_does_not_come_to_the_others_success_is_said_to(tmp_path, quick, slow, said):
+    shares = {
+        "quick": dict(zip((3, 5, 10), quick, strict=True)),
+        "slow": dict(zip((3, 5, 10), slow, strict=True)),
+    }
+    every = product(shares, range(4), (3, 5, 10))
+    path = packed(tmp_path, {("reach", *each): shares[each[0]][each[2]] for each in every}, 50)
+    told = said_by(RESULTS / "minutes.py", path, "quick", "slow").splitlines()
+    assert len(told) == 2
+    assert all(said in line for line in told)
+
+
+def test_a_draw_that_lacks_an_amount_is_left_out(tmp_path, cells):
+    whole = {cell: count for cell, count in cells.items() if cell[2] != 1}
+    (tmp_path / "whole").mkdir()
+    expected = said_by(RESULTS / "minutes.py", packed(tmp_path / "whole", whole), "quick", "slow")
+    del cells["reach", "slow", 1, 3]
+    told = said_by(RESULTS / "minutes.py", packed(tmp_path, cells), "quick", "slow")
+    assert told == expected.replace("3 draws", "3 draws (1 not whole)")
+
+
+def test_a_task_of_one_amount_leaves_the_others_their_lines(tmp_path, cells):
+    (tmp_path / "reach").mkdir()
+    expected = said_by(RESULTS / "minutes.py", packed(tmp_path / "reach", cells), "quick", "slow")
+    cells |= {("pick_place", mode, draw, 60): 100 for mode in ("quick", "slow") for draw in range(4)}
+    told = said_by(RESULTS / "minutes.py", packed(tmp_path, cells), "quick", "slow")
+    assert told == f"{expected}pick_place, quick: expected policies of several amounts of data, got one\n"
 
 
 def test_success_over_minutes_is_drawn_and_said(archive, tmp_path):
@@ -131,6 +211,13 @@ def test_success_over_minutes_is_drawn_and_said(archive, tmp_path):
     for mode, minutes, share, low, high in points:
         assert float(low) < float(share) < float(high)
         assert float(share) == pytest.approx(100 * share_after(mode, float(minutes)), abs=6.0)
+
+
+def test_one_draw_has_no_interval(tmp_path, cells):
+    path = packed(tmp_path, {cell: count for cell, count in cells.items() if cell[2] == 0})
+    told = said_by(RESULTS / "success.py", tmp_path / "figure.png", path)
+    assert "reach, quick: 20.0 min 92.5 % (one draw)" in told
+    assert "nan" not in told
 
 
 def test_a_contact_after_the_hand_got_nearer_no_more_is_told_apart(tmp_path):
@@ -161,6 +248,12 @@ def test_a_contact_after_the_hand_got_nearer_no_more_is_told_apart(tmp_path):
         (
             ("minutes.py", RESULTS / "teleop_modes_answer.tar.xz", "ee", "direct"),
             "pick_place, ee: expected policies of several amounts of data, got one",
+        ),
+        (("metrics.py", RESULTS / "takeover_takeover.json"), "expected three modes with all draws"),
+        (("success.py", "figure.png", RESULTS / "takeover_takeover.tar.xz"), "expected undisturbed policies"),
+        (
+            ("minutes.py", RESULTS / "takeover_takeover.tar.xz", "ee", "direct"),
+            "expected undisturbed policies",
         ),
     ],
 )
