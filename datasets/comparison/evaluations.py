@@ -25,6 +25,7 @@ is another task, another policy or anything else in `conditions` under the same 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 from typing import Annotated, Any
 
 import msgspec
@@ -109,13 +110,15 @@ class Condition:
     @property
     def content(self) -> dict[str, Any]:
         """The entry in the JSON of a report."""
+        learnt = [policy.trained_on for policy in self.policies]
+        known = [name for name in learnt[0] if all(name in each for each in learnt)]
         return {
             "label": self.label,
             "successes": self.successes,
             "rollouts": len(self.rollouts),
             "seeds": [float(run.values.mean()) for run in self.runs()],
             "draws": len({policy.draw for policy in self.policies}),
-            "trained_on": self.policies[0].trained_on,
+            "trained_on": {name: fmean(each[name] for each in learnt) for name in known},
         }
 
     def runs(self, outcome: str = SUCCESS) -> list[Run]:

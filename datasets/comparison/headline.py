@@ -62,8 +62,8 @@ def cautions(comparison: Comparison) -> dict[str, bool]:
     conditions = [*outcomes.conditions.values()] if outcomes else []
     policies = [each.content for each in conditions]
     rollouts = [{len(run.values) for run in each.runs()} for each in conditions]
-    data = [each["trained_on"] for each in policies]
-    amounts = [[each[name] for each in data if name in each] for name in ("episodes", "operator_time")]
+    learnt = [policy.trained_on for each in conditions for policy in each.policies]
+    amounts = [[each[name] for each in learnt if name in each] for name in ("episodes", "operator_time")]
     return {
         _NO_POLICIES: not policies,
         _FEW_SEEDS: any(len(each["seeds"]) < 5 for each in policies),

@@ -8,6 +8,7 @@ import pytest
 from compare_helpers import condition, judge
 
 from handrail.datasets.comparison.collection import collected, rate_ratio, success_difference
+from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.headline import cautions, headline
 from handrail.datasets.reading.demonstration import Demonstration
@@ -83,3 +84,27 @@ def test_policies_of_unlike_numbers_of_rollouts_are_named():
         )
         told = cautions(SimpleNamespace(everything=everything, outcomes=found))
         assert any("different numbers of rollouts" in text for text, holds in told.items() if holds) == said
+
+
+@pytest.mark.parametrize(("others", "said"), [((50.0, 51.0), False), ((50.0, 100.0), True)])
+def test_amounts_of_data_are_those_of_all_policies(others, said):
+    """Not of the first policy of each condition alone."""
+    groups = [attempts(label, 20, 0.5, 5) for label in "ab"]
+    everything = SimpleNamespace(groups=groups, differences=[], measurements=SimpleNamespace(metrics=()))
+    conditions = {
+        label: Condition(
+            label, tuple(Policy(k, k, {"episodes": e}, {0: {"success": True}}) for k, e in enumerate(learnt))
+        )
+        for label, learnt in (("a", (50.0, 50.0)), ("b", others))
+    }
+    assert conditions["a"].content["trained_on"] == {"episodes": 50.0}
+    assert conditions["b"].content["trained_on"] == {"episodes": sum(others) / 2}
+    found = SimpleNamespace(conditions=conditions, differences=[])
+    told = cautions(SimpleNamespace(everything=everything, outcomes=found))
+    assert [on for words, on in told.items() if "different amounts of data" in words] == [said]
+
+
+def test_an_amount_that_some_policies_lack_has_no_mean():
+    learnt = {"episodes": 50.0, "attempts": 60.0}, {"episodes": 60.0}
+    policies = [Policy(k, k, each, {0: {"success": True}}) for k, each in enumerate(learnt)]
+    assert Condition("a", tuple(policies)).content["trained_on"] == {"episodes": 55.0}
