@@ -55,8 +55,9 @@ def points_span(interval: tuple[float, float] | None) -> str:
 
 
 def p_value(p: float) -> str:
-    """Return a p-value with its sign of comparison."""
-    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+    """Return a p-value with its sign of comparison, never rounded up to 0.05."""
+    said = "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+    return "p < 0.05" if p < 0.05 and said == "p = 0.05" else said
 
 
 def p_alone(p: float | None) -> str:

@@ -11,7 +11,7 @@ from handrail.datasets.presentation.drawing import png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.markup import panels
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.presentation.wording import percent
+from handrail.datasets.presentation.wording import p_value, percent
 from handrail.datasets.statistics.contrast import LEVEL, Contrast
 from handrail.datasets.statistics.replicates import equivalence_p
 from handrail.datasets.storage.atomic import explained, write_whole
@@ -166,7 +166,7 @@ def _equivalent(found: Contrast, asked: Declared) -> str:
     p = equivalence_p(found, asked.margin)
     verdict = "not tested before all draws are done"
     if p is not None and found.p_adjusted is not None:
-        verdict = f"{'' if p < LEVEL else 'not '}shown, p {p:.2g}"
+        verdict = f"{'' if p < LEVEL else 'not '}shown, {p_value(p)}"
     return f"Equivalence of {asked.label} within {100 * asked.margin:g} points: {verdict}."
 
 

@@ -11,6 +11,7 @@ from handrail.datasets.comparison.collection import collected, rate_ratio, succe
 from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.headline import cautions, headline
+from handrail.datasets.presentation.wording import p_alone, p_value
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics.contrast import adjusted
@@ -108,3 +109,11 @@ def test_an_amount_that_some_policies_lack_has_no_mean():
     learnt = {"episodes": 50.0, "attempts": 60.0}, {"episodes": 60.0}
     policies = [Policy(k, k, each, {0: {"success": True}}) for k, each in enumerate(learnt)]
     assert Condition("a", tuple(policies)).content["trained_on"] == {"episodes": 55.0}
+
+
+@pytest.mark.parametrize(
+    ("p", "said"), [(3e-5, "p < 0.001"), (0.0494, "p = 0.049"), (0.0496, "p < 0.05"), (0.0504, "p = 0.05")]
+)
+def test_a_p_is_not_rounded_across_the_level(p, said):
+    assert p_value(p) == said
+    assert f"p {p_alone(p)}" == said.replace("p = ", "p ")

@@ -159,7 +159,7 @@ def test_a_mode_that_needs_twice_the_minutes_is_said_to(archive):
         ratio, low, high = ratios[name]
         assert low < true < high
         assert ratio == pytest.approx(true, rel=0.15)
-    assert told.count("; highest success quick 91 %, slow 75 %") == 2
+    assert told.count("; highest success quick 92 %, slow 72 %") == 2
     assert "parallel" not in told
     assert "beyond" not in told
 
@@ -216,7 +216,7 @@ def test_success_over_minutes_is_drawn_and_said(archive, tmp_path):
 def test_one_draw_has_no_interval(tmp_path, cells):
     path = packed(tmp_path, {cell: count for cell, count in cells.items() if cell[2] == 0})
     told = said_by(RESULTS / "success.py", tmp_path / "figure.png", path)
-    assert "reach, quick: 20.0 min 92.5 % (one draw)" in told
+    assert "reach, quick: 20.0 min 90.5 % (one draw)" in told
     assert "nan" not in told
 
 

@@ -136,7 +136,7 @@ def test_a_pair_with_a_margin_is_tested_for_equivalence(gathered):
     assert said[0].startswith("ee − decoupled")
     assert "Equivalence of ee − decoupled within 10 points: not shown" in said[-1]
     like = gathered(shares=dict.fromkeys(SHARES, (0.95, 0.9, 1.0, 0.9)))
-    assert "within 10 points: shown, p 0.0" in answer(contrasts(like), DESIGN)[-1]
+    assert "within 10 points: shown, p = 0.0" in answer(contrasts(like), DESIGN)[-1]
     text = plan(DESIGN)
     assert "Declared: ee − decoupled, ee − direct (same number), over reach, tray together." in text
     assert "Of ee − decoupled equivalence is declared too" in text
