@@ -60,6 +60,39 @@ def test_lerobot_s_own_parser_takes_the_training_commands():
                 assert not policy.push_to_hub
 
 
+DATASETS = ("record", "cockpit", "demo", "edit delete", "edit keep", "edit merge", "edit trim", "edit render")
+KINDS = {
+    **{f"handrail-{name}": "dataset" for name in DATASETS},
+    **dict.fromkeys(("lerobot-record", "lerobot-rollout"), "dataset"),
+    **dict.fromkeys(("handrail-train", "lerobot-train"), "policy"),
+    "handrail-edit split": "datasets",
+    "handrail-encoder": "encoder",
+    "handrail-compare": "report",
+    "handrail-study": "study",
+}
+
+
+def written(words: list[str]) -> str:
+    """Return the folder or file that a command writes, "" where it names none."""
+    name, *rest = words
+    if name.startswith("lerobot-"):
+        flag = "--output_dir=" if name == "lerobot-train" else "--dataset.root="
+        return next((word.removeprefix(flag) for word in rest if word.startswith(flag)), "")
+    if name in ("handrail-record", "handrail-cockpit", "handrail-demo"):
+        return rest[0] if rest and not rest[0].startswith("--") else ""
+    return rest[rest.index("--output") + 1] if "--output" in rest else ""
+
+
+def test_no_two_kinds_of_things_have_one_place():
+    """The commands of the pages can be pasted in order: no dataset is where another page puts a study."""
+    found: dict[str, set[str]] = {}
+    for words in commands():
+        if words[0] in KINDS and (place := written(words)):
+            found.setdefault(place, set()).add(KINDS[words[0]])
+    assert set(KINDS.values()) == set(chain(*found.values()))
+    assert {place: kinds for place, kinds in found.items() if len(kinds) > 1} == {}
+
+
 def test_make_targets_exist():
     targets = set(re.findall(r"^([a-z]+):", text("Makefile"), re.MULTILINE))
     assert {words[1] for words in commands("make")} <= targets
