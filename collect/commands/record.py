@@ -75,7 +75,7 @@ def _record_here(
         _print_state(writer, console)
         recording.into(writer)
         if interactive or env.real:
-            console.print("Getting ready; the first time on a computer takes about a minute.")
+            console.print("Getting ready; this takes some seconds.")
             recording.warm_up(config.seed)
             console.print("Ready.")
         count = config.dataset.num_episodes

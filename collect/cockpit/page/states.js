@@ -1,6 +1,6 @@
 // In which state the page is: a name for its look, the words of the chip, and what to do about it.
 const STATES = {
-  preparing: ["getting ready …", "Getting ready. The first time, the controller is compiled: about a minute, once."],
+  preparing: ["getting ready …", "Getting ready. This takes some seconds."],
   ready: ["ready: press Start", ""],
   driving: ["recording", ""],
   practice: ["practice: not recorded", ""],
