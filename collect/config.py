@@ -139,8 +139,7 @@ class StoredConfig:
     @property
     def folder(self) -> Path:
         """The folder of the dataset: as given, or where LeRobot keeps its own."""
-        given = only_one(self.place, self.root, "--dataset.root")
-        if given:
+        if given := only_one(self.place, self.root, "--dataset.root"):
             return Path(given).expanduser()
         if not self.repo_id:
             raise HandrailError(
@@ -282,6 +281,7 @@ class DriveConfig(RecordConfig):
     # no flags: they mean nothing where a person at a browser drives a simulation
     operator: tyro.conf.Suppress[str] = "browser"
     noise: tyro.conf.Suppress[float] = 1.0
+    realtime: tyro.conf.Suppress[bool] = False
     human: tyro.conf.Suppress[HumanSettings] = field(default_factory=HumanSettings)
     person: tyro.conf.Suppress[int] = 0
     teleop: tyro.conf.Suppress[TeleopConfig] = field(default_factory=TeleopConfig)

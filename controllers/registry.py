@@ -85,9 +85,10 @@ class Registry[Spec: Any](Mapping[str, Spec]):
 
     @property
     def help(self) -> str:
-        """All names in one line; of what comes with Handrail, what it is."""
-        own = [f"{spec.name}: {spec.help}" for spec in self.built_in]
-        return "; ".join([*own, *(name for name in self if name not in self._built_in)])
+        """All names in one line; those that come with Handrail with their lines of help."""
+        others = {name for name, value in self._installed().items() if not value.startswith("handrail.")}
+        others -= self._built_in.keys()
+        return "; ".join(name if name in others else f"{name}: {self[name].help}" for name in self)
 
     def accepts(self, name: str) -> bool:
         """Return whether the command line may say a name: there is one, or it is a `module:name`."""

@@ -19,11 +19,12 @@ class StudySessionConfig:
 
     verb: tyro.conf.Positional[Verb]
     """new: write a study's file to begin with. run: lead a participant through what is left of their session.
-    status: who is where. export: write the tables. erase: remove a participant and all that is theirs."""
+    status: print how far each participant is. export: write the tables. erase: remove a participant and all
+    that is theirs."""
     place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")]
     """Folder of the study."""
     participant: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="PARTICIPANT")] = ""
-    """Who, for run and erase: an id that says nothing of the person, such as P001."""
+    """Id of the participant, for run and erase, such as P001; it says nothing of the person."""
     cockpit: CockpitConfig = field(default_factory=CockpitConfig)
 
     @property

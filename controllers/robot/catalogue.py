@@ -5,8 +5,6 @@ from pathlib import Path
 
 from handrail.controllers.registry import Registry
 
-_FOLDER = Path(__file__).parent / "robots"
-
 
 @dataclass(frozen=True)
 class RobotSpec:
@@ -14,7 +12,12 @@ class RobotSpec:
 
     name: str  # as on the command line
     file: Path  # its description; `robots/ridgeback_ur10.toml` explains the format
-    help: str = "comes with Handrail"  # one line
+    help: str = ""  # one line
 
 
-ROBOTS = Registry("robot", RobotSpec, (RobotSpec(path.stem, path) for path in sorted(_FOLDER.glob("*.toml"))))
+def _spec(path: Path) -> RobotSpec:
+    """Return the entry of a description; its first line, a comment, is the line of help."""
+    return RobotSpec(path.stem, path, path.read_text("utf-8").partition("\n")[0].strip("# ."))
+
+
+ROBOTS = Registry("robot", RobotSpec, map(_spec, sorted((Path(__file__).parent / "robots").glob("*.toml"))))

@@ -70,7 +70,7 @@ class TrainConfig:
     threads: Advanced[AtLeastOne] = 1
     """Of PyTorch; two trainings with one thread each are faster than one after the other with two."""
     device: str = ""
-    """cpu, cuda, cuda:1, mps; the preset's when empty."""
+    """Device: cpu, cuda, cuda:1, mps; the preset's when empty."""
     save_freq: Advanced[AtLeastOne] = 2000
     """Updates between checkpoints; there is always one at the end."""
     policy_options: Advanced[Words] = ()

@@ -1,10 +1,14 @@
 """Laws of the help: `handrail` lists the commands and takes them as words; help has two layers."""
 
+import re
 import sys
 
 import pytest
-from command_helpers import flags_of
+from command_helpers import command, flags_of
+from pages import COMMAND_CONFIGS
 
+from handrail.collect.operators.modes import MODES
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.scripts.__main__ import main
 from handrail.scripts.commands import COMMANDS, GROUPS
 
@@ -47,7 +51,26 @@ def test_help_shows_the_fewer_flags_of_those_that_help_all_shows(name, first, ad
     assert advanced in every - few
 
 
+def texts(name):
+    """Return the help of each flag of a command, as far as its first line."""
+    shown = command("--help-all", name=name.removeprefix("handrail-")).stdout
+    found = re.findall(r"^[│ ] (--[a-z]\S+).*?(?:  +| *│?\n[│ ] {5,})([^│\s].*)$", shown, re.MULTILINE)
+    assert len(found) == len(re.findall(r"^[│ ] --[a-z]", shown, re.MULTILINE))
+    return dict(found)
+
+
+@pytest.mark.parametrize("name", COMMAND_CONFIGS)
+def test_each_help_begins_as_a_sentence_does(name):
+    wrong = {flag: said for flag, said in texts(name).items() if not re.match("(?!Who|What|Over)[A-Z]", said)}
+    assert wrong == {}
+
+
+def test_each_robot_has_a_help_of_its_own_and_so_has_an_entry_of_ours_that_is_installed():
+    assert len({spec.help for spec in ROBOTS.built_in} - {""}) == len(ROBOTS.built_in)
+    assert "; rl: " in MODES.help
+
+
 def test_the_cockpit_s_help_shows_no_flag_that_cannot_matter_there():
-    every, meaningless = flags_of("cockpit"), ("--operator", "--noise", "--human.", "--teleop.")
+    every, meaningless = flags_of("cockpit"), ("--operator", "--noise", "--human.", "--teleop.", "--realtime")
     assert not [flag for flag in every if flag.startswith((*meaningless, "--client.", "--workers", "--ray"))]
     assert "--cockpit.port" in every
