@@ -76,7 +76,7 @@ class Perturbation:
 
     @property
     def words(self) -> str:
-        """The name of an arm under it, such as `pushed delayed:5`; usual sizes are not said."""
+        """The name of a condition under it, such as `pushed delayed:5`; usual sizes are not said."""
         return " ".join(
             _WORDS[name] + ("" if size == DEFAULTS[name] else f":{size:g}")
             for name, size in self.sizes.items()

@@ -69,7 +69,7 @@ def _deflection(episode: Demonstration, scale: Scale) -> FloatArray:
 
 @metric("", "lower")
 def undos(episode: Demonstration, scale: Scale) -> float:
-    """How often the operator went back to a checkpoint."""
+    """How often the operator went back to an earlier pause."""
     return float(_of_person(episode, "undos").max())
 
 

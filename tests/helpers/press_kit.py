@@ -1,4 +1,4 @@
-"""A package from outside: a task in one file with one entry, and an entry of every other kind."""
+"""A package from outside: a task in one file, a mode, an operator, a controller and a robot."""
 
 from dataclasses import dataclass
 

@@ -47,7 +47,7 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
     """Let the scripted operators do every task in every mode, and count how it went."""
 
     tasks: Names = "all"
-    """Which tasks, or all: drawer, pick_place, reach, tray."""
+    """Which tasks, or all that the robot can do."""
     modes: Names = "ee,switching,base+ee,direct,direct_single,leader,decoupled"
     """Which teleop modes, or all."""
     episodes: AtLeastOne = 20
