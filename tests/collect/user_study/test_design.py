@@ -1,17 +1,20 @@
 """A study's file is checked whole where it enters: one line that says what is wrong."""
 
 import json
+import re
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 from user_study_helpers import study_folder
 
-from handrail.collect.user_study import run
+from handrail.collect.user_study import design, run
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.design import UserStudy
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.description import load_description
 from handrail.controllers.typed import decoded
 
 GOOD = {"title": "t", "consent": "c", "modes": ["ee", "direct"], "tasks": ["reach"]}
@@ -49,6 +52,13 @@ WRONG = {
     "least": ({"questions": [NUMBER | {"least": 9, "most": 1}]}, "expected least < most"),
     "control letters": ({"consent": "a\x1b[2J"}, "consent: expected a text"),
 }
+
+
+def test_the_example_names_every_camera_of_its_robot():
+    source = (Path(design.__file__).parent / "example.toml").read_text()
+    (said,) = re.findall(r"^cameras = .*?# (.*)$", source, re.MULTILINE)
+    cameras = load_description(tomllib.loads(source)["robot"]).camera_names
+    assert {*re.findall('"(.*?)"', said)} == {*cameras}
 
 
 @pytest.mark.parametrize("case", WRONG)
