@@ -7,10 +7,13 @@ from handrail.controllers.interface.channels import Channels
 
 
 def commanded_joints(channels: Channels, mask: BoolArray) -> BoolArray:
-    """Return which joints have a command of their own, through a joint or a base channel, (n,)."""
+    """Return which joints have a command of their own, through a joint or a base channel, (n,).
+
+    vx or vy of the base alone fixes neither of its joints: these are along the world's axes.
+    """
     joints = mask[channels.joint_slice].copy()
     if channels.base:
-        joints[:2] |= mask[:2].any()
+        joints[:2] |= mask[:2].all()
         joints[2] |= mask[2]
     return joints
 
@@ -19,10 +22,11 @@ def leaves_freedom(channels: Channels, mask: BoolArray) -> bool:
     """Whether fewer velocities are commanded than there are joints that move a hand.
 
     Each row of a twist takes a joint that nobody commands: of the hand's own arm first, then of those that
-    move another hand too.
+    move another hand too. vx or vy of the base alone takes one of its joints.
     """
-    hands = range(len(channels.hands))
-    left = [channels.moving(hand) & ~commanded_joints(channels, mask) for hand in hands]
+    hands, commanded = range(len(channels.hands)), commanded_joints(channels, mask)
+    commanded[:1] |= mask[channels.base_slice][:2].any()
+    left = [channels.moving(hand) & ~commanded for hand in hands]
     count = np.sum(left, axis=0)
     own = [np.count_nonzero(each & (count == 1)) for each in left]
     rows = [np.count_nonzero(mask[channels.hand_slice(hand)]) for hand in hands]

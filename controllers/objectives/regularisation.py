@@ -60,7 +60,8 @@ def narrow_joint_centring(channels: Channels, limits: Limits, weight: float = 10
         for hand in range(len(channels.hands)):
             if channels.twist_mask(mask, hand).all():
                 steered |= channels.moving(hand)
-        alone = not commanded_joints(channels, mask).any() and leaves_freedom(channels, mask)
+        others = mask[channels.base_slice].any() or mask[channels.joint_slice].any()
+        alone = not others and leaves_freedom(channels, mask)
         return weight * narrow * (steered & alone)
 
     return (Objective("centring", lambda stage, p: (stage.q - middle) / half, np.zeros(len(middle)), masked),)

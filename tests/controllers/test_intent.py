@@ -134,6 +134,15 @@ def test_the_base_twist_is_meant_in_its_frame():
         np.testing.assert_allclose(v[-1, :2], expected, atol=5e-3)
 
 
+@pytest.mark.parametrize("owned", [("base.vx",), ("base.vx", "base.wz")])
+def test_a_base_whose_way_ahead_alone_is_commanded_stops_sliding_sideways(owned):
+    MPC.reset()
+    drive, stand = asking({"base.vy": 0.3}, "base"), asking({}, *owned)
+    _, v, _ = roll(MPC, [drive] * 20 + [stand] * 80)
+    assert v[20, 1] > 0.25
+    assert np.abs(v[-1]).max() < 0.02
+
+
 def test_the_tool_twist_is_meant_in_its_frame_and_at_its_point():
     point = np.array([0.1, 0.0, 0.15])
     asked = asking({"ee.vz": 0.1, "ee.wx": 0.2}, "ee", frames=Frames(tool="tool", point=point))

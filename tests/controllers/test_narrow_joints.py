@@ -18,6 +18,7 @@ def test_only_narrow_joints_and_only_while_just_the_whole_tool_is_steered():
     for names in (
         ("base",),
         ("base", "ee"),
+        ("base.vx", "ee"),
         ("ee.vx", "ee.vy", "ee.vz", "ee.wz"),
         ("joint",),
         ("ee", "arm"),

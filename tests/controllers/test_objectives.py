@@ -10,6 +10,7 @@ from ideal_robot import CHANNELS, HOME, MODEL, PERIOD, intent, realised, roll
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.hold import end_effector_hold, hold_parameters
 from handrail.controllers.objectives.objective import Stage, switchable, switched
+from handrail.controllers.objectives.ownership import leaves_freedom
 from handrail.controllers.objectives.tray import GRAVITY, acceleration, tray_levelling
 from handrail.controllers.ocp.settings import MpcSettings
 
@@ -123,6 +124,14 @@ def test_objectives_rest_where_everything_is_commanded():
         for groups in (("joint",), ("base", "ee")):
             assert not np.any(objective.weights(CHANNELS.mask(*groups))), objective.name
         assert np.any(objective.weights(np.zeros(CHANNELS.size, dtype=bool))), objective.name
+
+
+def test_one_channel_of_the_base_takes_one_joint():
+    """vx alone leaves the base a way; the arm, vx, the turn and one axis of the hand leave nothing."""
+    arm_and_one = ("arm", "base.vx", "base.wz")
+    assert leaves_freedom(CHANNELS, CHANNELS.mask(*arm_and_one))
+    assert not leaves_freedom(CHANNELS, CHANNELS.mask(*arm_and_one, "ee.vx"))
+    assert not leaves_freedom(CHANNELS, CHANNELS.mask("arm", "base"))
 
 
 def drift(positions):
