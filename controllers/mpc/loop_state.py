@@ -35,7 +35,7 @@ class LoopState(NamedTuple):
     plan: Plan | None = None  # of the last update; None where the robot follows something else
     planned: float = 0.0  # how long the command follows its plan [s]
     rest: FloatArray | None = None
-    """Where joints stay that move no steered hand, (n,); NaN of the others. None of a robot with one hand."""
+    """Where joints stay that nobody steers, (n,); NaN of the others. None where all joints move each hand."""
     paired: tuple[bool, bool] = False, False  # whether two hands are being steered as a pair, and parted
     active: IntArray = NOTHING_ACTIVE
     """Names of the rows that were active in the last problem among these pairs."""
@@ -49,14 +49,12 @@ class LoopState(NamedTuple):
     def facing(self, state: State, intent: Intent, channels: Channels) -> "LoopState":
         """Return the state in which the problem of a robot's state and an intent is built."""
         around, predict = self.surroundings.known_at(state.expected), after(self.predict, intent)
+        rest = self.rest
         if len(channels.hands) > 1:
-            before = np.full(len(state.q), np.nan) if self.rest is None else self.rest
+            before = np.full(len(state.q), np.nan) if rest is None else rest
             stays = np.where(np.isnan(before), state.expected, before)
             rest = np.where(steered_joints(channels, intent.mask), np.nan, stays)
-            return self._replace(surroundings=around, predict=predict, rest=rest)
-        if around is self.surroundings and predict is self.predict:
-            return self
-        return self._replace(surroundings=around, predict=predict)
+        return self._replace(surroundings=around, predict=predict, rest=rest)
 
     def elapsed(self, time: float) -> float:
         """Return how long ago the command was sent [s]; 0 before the first.

@@ -36,8 +36,8 @@ def leaves_freedom(channels: Channels, mask: BoolArray) -> bool:
 
 
 def steered_joints(channels: Channels, mask: BoolArray) -> BoolArray:
-    """Return which joints move a hand of which an axis is commanded, (n,)."""
-    found = np.zeros(len(channels.joints), dtype=bool)
+    """Return which joints have a command of their own, or move a hand of which an axis is commanded, (n,)."""
+    found = commanded_joints(channels, mask)
     for hand in range(len(channels.hands)):
         if channels.twist_mask(mask, hand).any() or mask[channels.pair_slice].any():
             found |= channels.moving(hand)

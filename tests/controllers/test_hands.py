@@ -100,6 +100,17 @@ def test_an_arm_that_nobody_steers_stays_where_it_was_let_go(mpc):
     assert np.abs(before - HOME)[RIGHT & ~LEFT].max() > 0.1  # that was not home
 
 
+def test_joints_that_were_steered_stay_while_the_other_hand_is(mpc):
+    driven = Driven(mpc)
+    driven.steer(("left",), [0.0] * 6, 0.1)  # the right arm's place is known
+    driven.steer(("right.arm",), [0.3, *[0.0] * 6], 1.5)
+    driven.steer(("right.arm",), [0.0] * 7, 0.5)
+    before = driven.state.q
+    driven.steer(("left",), [0.0] * 6, 3.0)
+    assert np.abs(driven.state.q - before)[RIGHT & ~LEFT].max() < 0.03
+    assert np.abs(before - HOME)[RIGHT & ~LEFT].max() > 0.3
+
+
 def test_a_pair_is_kept_as_it_begins_while_the_base_drives(mpc):
     driven = Driven(mpc)
     driven.steer(("right",), [0.0, 0.05, 0.05, 0.0, 0.0, 0.0], 1.0)
