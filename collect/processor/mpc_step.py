@@ -110,6 +110,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         """Build the controller."""
         check_settings(self, NAME)
         model = load_model(self.robot)
+        model.description.limits.check_inside(f"{NAME} start", model.description.base.joints, self.start)
         channels, units = Channels.of(model.description), robot_units(self.units, model.description)
         self._around, self._action_names = parsed_obstacles(self.obstacles), units.action_names
         frames = Frames(self.base_frame, self.tool_frame)

@@ -36,6 +36,12 @@ def moved(pose: FloatArray, twist: FloatArray, seconds: float) -> FloatArray:
     return pose + seconds * turned(twist, pose[2] + 0.5 * seconds * twist[2])
 
 
+def _wrapped(pose: ArrayLike) -> FloatArray:
+    """Return a pose or a way of the base whose heading is within ±π, (3,)."""
+    x, y, heading = np.asarray(pose, dtype=np.float64)
+    return np.array([x, y, math.remainder(heading, 2.0 * math.pi)])
+
+
 class WholeBody:
     """Knows where a robot is, and what it was sent.
 
@@ -46,9 +52,10 @@ class WholeBody:
     Whatever is measured, a target moves no faster than its joint may: `|r⁺ − r| ≤ h v_max`.
 
     A robot without odometry is where its base's velocities have led; where it was not heard for more than
-    2.5 periods, where what it was sent has led. An observation that makes no sense, or the very same object
-    again, is none: the base goes on as it was sent, until the next one. So is one in which a joint is where
-    it cannot have come, `|q⁺ − q| > v_max Δt + 0.2`, or the base faster than four times its limit.
+    2.5 periods, where what it was sent has led. A heading is taken as the same one within ±π. An observation
+    that makes no sense, or the very same object again, is none: the base goes on as it was sent, until the
+    next one. So is one in which a joint is where it cannot have come, `|q⁺ − q| > v_max Δt + 0.2`, or the
+    base faster than four times its limit.
 
     Args:
         model: of the robot.
@@ -68,7 +75,8 @@ class WholeBody:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
         self._b = len(model.description.base.joints)
         limits = model.description.limits
-        self._fastest_base, self._fastest = limits.velocity[:3], limits.velocity[self._b :]
+        self._fastest_base = limits.velocity[:3] if self._b else np.zeros(3)
+        self._fastest = limits.velocity[self._b :]
         self._ends = limits.position_lower[self._b :], limits.position_upper[self._b :]
         grippers = [hand.gripper for hand in model.description.hands]
         strokes = [each.speed / each.stroke if each else _STROKES for each in grippers]
@@ -84,7 +92,7 @@ class WholeBody:
         """
         self._rests = rests
         self._gate = Gate(self._model, self._period, precision=np.float64)
-        self._base = np.array(base, dtype=np.float64)
+        self._base = _wrapped(base)
         self._reading: BodyReading | None = None
         self._said: object = None
         self._heard, self._time, self._sent_at = -math.inf, -math.inf, -math.inf
@@ -96,7 +104,7 @@ class WholeBody:
 
     def place(self, base: ArrayLike) -> None:
         """Take the base to be somewhere now, (3,) [m, rad]; the robot has no odometry of its own."""
-        self._base, self._heard = np.array(base, dtype=np.float64), self._time
+        self._base, self._heard = _wrapped(base), self._time
 
     @property
     def velocity(self) -> FloatArray:
@@ -198,15 +206,13 @@ class WholeBody:
         elif reading.pose is None:
             passed = _passed(self._heard, now, self._timeout)
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), passed)
-        if reading.pose is not None:
-            self._base = reading.pose
+        self._base = _wrapped(self._base if reading.pose is None else reading.pose)
         if math.inf > now - self._sent_at > _HOLD or (before is None and not self._rests):
             twist = turned(reading.twist, self._base[2])
             within = np.clip(twist, -self._fastest_base, self._fastest_base)
             self._gate.velocity[: self._b] = within[: self._b]
         if before is not None:
-            change = self._base - base
-            change[2] = math.remainder(change[2], 2.0 * math.pi)  # a heading may begin anew at ±π
+            change = _wrapped(self._base - base)  # a heading begins anew at ±π
             farthest = self._fastest_base * _passed(self._heard, now, math.inf) + _LEAD
             self._under_way -= np.where(np.abs(change) <= farthest, change, 0.0)  # else it was corrected
         self._reading = reading

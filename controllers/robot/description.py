@@ -242,15 +242,13 @@ def _check_joints(robot: RobotDescription) -> None:
     for name, values in ({"home: q": robot.home} | vectors).items():
         if values.shape != (size,):
             raise HandrailError(f"{name}: expected {size} numbers, one a joint, got {len(values)}")
-    triples = zip(robot.joints, limits.position_lower, robot.home, limits.position_upper, strict=True)
-    for name, lower, home, upper in triples:
+    for name, lower, upper in zip(robot.joints, limits.position_lower, limits.position_upper, strict=True):
         if not lower < upper:
             raise HandrailError(
                 f"limits of joint {name}: expected position_lower below position_upper, "
                 f"got {lower} and {upper}"
             )
-        if not lower <= home <= upper:
-            raise HandrailError(f"home of joint {name}: expected {lower} to {upper}, got {home}")
+    limits.check_inside("home", robot.joints, robot.home)
 
 
 def _check_names(robot: RobotDescription) -> None:

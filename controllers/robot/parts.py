@@ -1,5 +1,6 @@
 """The parts of a robot as its description file names them, each with the range of its values."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -61,6 +62,13 @@ class Limits:
     acceleration: Positives
     effort: Positives
     servo: Positives
+
+    def check_inside(self, what: str, joints: tuple[str, ...], values: Iterable[float]) -> None:
+        """Check that the positions of the first joints are inside their limits."""
+        ranges = zip(joints, self.position_lower, values, self.position_upper, strict=False)
+        for name, lower, value, upper in ranges:
+            if not lower <= value <= upper:
+                raise HandrailError(f"{what} of joint {name}: expected {lower} to {upper}, got {value}")
 
 
 @dataclass(frozen=True)

@@ -257,6 +257,7 @@ def test_it_says_the_robot_s_own_action():
         ({"fps": 9}, "at least 10 Hz"),
         ({"start": [0, 0]}, "start"),
         ({"start": [0, math.inf, 0]}, "start"),
+        ({"robot": "lekiwi", "start": [0, 5, 0]}, r"start of joint y: expected -2\.0 to 2\.0, got 5$"),
         ({"timeout": math.nan}, "timeout"),
         ({"settings": 3}, "settings: expected a table"),
         ({"units": {"joints": {}, "gripper": {"name": "g", "opened": 1, "closed": 1}}}, "to differ"),

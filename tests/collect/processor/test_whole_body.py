@@ -3,35 +3,38 @@
 import inspect
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from places import ROOT
 from processor_helpers import PERIOD, Drive
 
 from handrail.collect.lekiwi.link import Link
 from handrail.collect.processor.mpc_step import MaskedMpcStep
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import RobotModel, load_model
+from handrail.controllers.robot.parts import Limits
 
 MODEL = load_model("lekiwi")
 DESCRIPTION = MODEL.description
 TURN = np.append(np.where(np.arange(MODEL.size) == 2, 0.4, 0.0), 0.0)
+UNITS = {
+    "joints": {name: {"name": name, "unit": "radians"} for name in DESCRIPTION.arm_joints},
+    "base": {"unit": "radians", "pose": ["px", "py", "ph"]},
+    "gripper": {"name": "g", "opened": 0.0, "closed": 1.0},
+}
+ARM = dict(zip((f"{name}.pos" for name in DESCRIPTION.arm_joints), DESCRIPTION.home[3:], strict=True))
 
 
 def driven(start, corrected=0.0):
     """Turn a base with odometry, which is corrected once; return how far off it is expected, (T, 3)."""
-    units = {
-        "joints": {name: {"name": name, "unit": "radians"} for name in DESCRIPTION.arm_joints},
-        "base": {"unit": "radians", "pose": ["px", "py", "ph"]},
-        "gripper": {"name": "g", "opened": 0.0, "closed": 1.0},
-    }
-    body, pose, off = WholeBody(MODEL, robot_units(units, DESCRIPTION), 0.05), np.array([0.0, 0.0, start]), []
-    arm = dict(zip((f"{name}.pos" for name in DESCRIPTION.arm_joints), DESCRIPTION.home[3:], strict=True))
+    body, pose, off = WholeBody(MODEL, robot_units(UNITS, DESCRIPTION), 0.05), np.array([0.0, 0.0, start]), []
     for step in range(60):
         pose[0] += corrected if step == 20 else 0.0
         said = {"g": 0.0, "px": pose[0], "py": pose[1], "ph": math.remainder(pose[2], 2.0 * math.pi)}
-        state = body.observe(arm | said, 0.05 * (step + 1))
+        state = body.observe(ARM | said, 0.05 * (step + 1))
         away = state.expected[:3] - pose
         off.append([*away[:2], math.remainder(away[2], 2.0 * math.pi)])
         body.send(TURN)
@@ -45,6 +48,32 @@ def test_a_base_is_expected_where_it_is_though_its_heading_wraps_or_its_place_is
     usual = driven(-0.5)
     np.testing.assert_allclose(driven(start, corrected), usual, atol=1e-6)
     assert np.abs(usual).max() < 0.1
+
+
+def test_a_base_turns_on_however_often_it_has_turned():
+    drive = Drive(robot="lekiwi", units="lekiwi", start=[0.0, 0.0, 6.2])
+    drive.go({"base.wz": 0.3}, 2.0)
+    assert drive.robot.pose[2] > 0.45
+
+
+def test_a_heading_after_some_turns_is_that_within_half_a_turn():
+    """The MPC's range of headings is ±2π: beyond it the robot would turn back by itself."""
+    body = WholeBody(MODEL, robot_units(UNITS, DESCRIPTION), 0.05)
+    state = body.observe(ARM | {"g": 0.0, "px": 0.1, "py": 0.2, "ph": 13.0}, 0.05)
+    np.testing.assert_allclose(state.q[:3], [0.1, 0.2, 13.0 - 4.0 * math.pi], atol=1e-9)
+    body.place([0.0, 0.0, -7.0])
+    assert body.observe(ARM | {"g": 0.0, "px": 0.0, "py": 0.0, "ph": -7.0}, 0.1).q[2] > -1.0
+
+
+def test_a_fixed_robot_of_two_joints_is_a_body_too():
+    arm = load_model(ROOT / "docs/examples/so101.toml").description
+    limits = Limits(**{name: values[:2] for name, values in vars(arm.limits).items()})
+    short = replace(arm.arms[0], joints=arm.arms[0].joints[:2])
+    model = RobotModel(replace(arm, arms=(short,), home=arm.home[:2], limits=limits))
+    units = robot_units("plain", model.description)
+    body = WholeBody(model, units, 0.05)
+    np.testing.assert_array_equal(body.observe(dict.fromkeys(units.observation_names, 0.0), 0.05).q, 0.0)
+    assert body.send([0.1, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("rate", [20.0, 15.0])
