@@ -7,7 +7,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 
 Prediction = Callable[[Intent, FloatArray], FloatArray]
 """The intent now and times ahead, (N,) [s] → predicted values on every channel, (N, m).
@@ -114,11 +114,15 @@ class Smoothed:
     predict: Prediction  # Ψ
     time_constant: float | FloatArray  # τ, one or one a channel [s]
     last: Level | None = None  # command and level now; None at rest, before the first intent
+    silence: float = DEAD_MAN_TIME
+    """Time without an intent after which it begins from rest, as the robot has braked [s]."""
 
     def after(self, intent: Intent) -> "Smoothed":
         """Return the prediction that has heard an intent."""
         rest = np.zeros(len(intent.values))
-        last = self.last or Level(intent.time, rest, rest)
+        last = self.last
+        if last is None or intent.time - last.time > self.silence:
+            last = Level(intent.time, rest, rest)
         left = np.exp(-max(intent.time - last.time, 0.0) / (self.time_constant + rest))
         command = np.where(intent.mask, intent.values, 0.0)
         level = np.where(intent.mask, last.command + left * (last.level - last.command), 0.0)

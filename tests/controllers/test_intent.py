@@ -105,6 +105,18 @@ def test_smoothed_begins_at_rest_and_again_on_new_channels():
     np.testing.assert_array_equal(new(intent(np.ones(18), "ee", time=9.0), np.zeros(1)), 0.0)
 
 
+def test_smoothed_begins_from_rest_after_a_silence():
+    predict = Smoothed(constant, 0.5)
+    for time in np.arange(0.0, 2.0, 0.1):
+        predict = after(predict, intent(np.ones(18), "ee", time=time))
+    levels = []
+    for gap in (0.2, 5.0):  # shorter and longer than the dead-man time
+        released = intent(np.zeros(18), "ee", time=1.9 + gap)
+        levels.append(after(predict, released)(released, np.zeros(1))[0, 3:9])
+    assert levels[0].min() > 0.8
+    np.testing.assert_array_equal(levels[1], 0.0)
+
+
 def test_turns_may_be_followed_less_closely_than_the_way():
     """A small weight of the tool's turning leaves the way alone and costs some of the turn."""
     asked, errors = {"ee.vx": 0.1, "ee.vz": 0.05, "ee.wy": 0.3}, []
