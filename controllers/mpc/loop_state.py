@@ -50,7 +50,7 @@ class LoopState(NamedTuple):
         """Return the state in which the problem of a robot's state and an intent is built."""
         around, predict = self.surroundings.known_at(state.expected), after(self.predict, intent)
         rest = self.rest
-        if len(channels.hands) > 1:
+        if channels.moves:
             before = np.full(len(state.q), np.nan) if rest is None else rest
             stays = np.where(np.isnan(before), state.expected, before)
             rest = np.where(steered_joints(channels, intent.mask), np.nan, stays)

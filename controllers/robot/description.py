@@ -60,11 +60,10 @@ class RobotDescription:
 
     @cached_property
     def moves(self) -> tuple[tuple[bool, ...], ...]:
-        """Which joints move each hand, where there are several; () of a single one."""
-        if len(self.hands) == 1:
-            return ()
+        """Which joints move each hand; () where all move a single one."""
         chains = [set(chain(self.arms, hand.frame)) | set(self.base.joints) for hand in self.hands]
-        return tuple(tuple(joint in moving for joint in self.joints) for moving in chains)
+        moves = tuple(tuple(joint in moving for joint in self.joints) for moving in chains)
+        return () if len(moves) == 1 and all(moves[0]) else moves
 
     def check_hands(self, what: str, needed: int) -> None:
         """Check that the robot has as many hands as something needs, such as `mode both`."""

@@ -1,12 +1,18 @@
 """Joints that cannot turn half around: which they are, when they are drawn to their middle, and what for."""
 
+from dataclasses import replace
+
 import numpy as np
 from collect_helpers import episode
+from ideal_robot import roll
 
 from handrail.collect.seeds import episode_seed
 from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.objectives.ownership import leaves_freedom
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import RobotModel, load_model
 
 
 def test_only_narrow_joints_and_only_while_just_the_whole_tool_is_steered():
@@ -25,6 +31,21 @@ def test_only_narrow_joints_and_only_while_just_the_whole_tool_is_steered():
         (),
     ):
         assert not centring.weights(channels.mask(*names)).any(), names
+
+
+def test_of_a_single_hand_joints_that_do_not_move_it_are_left_alone():
+    """A head and an arm without a hand: nothing draws them to their middle, nor do they leave freedom."""
+    two = load_model("bi_so101").description
+    model = RobotModel(replace(two, hands=(replace(two.hands[0], name=""),)))
+    channels, others = Channels.of(model.description), np.arange(model.size) >= 8
+    (centring,) = narrow_joint_centring(channels, model.description.limits)
+    assert not centring.weights(channels.mask("ee"))[others].any()
+    assert not leaves_freedom(channels, channels.mask("base", *channels.names[12:17]))
+    mpc, q = MaskedMpc(model, objectives=(centring,)), np.array(two.home)
+    q[-2:] += 0.3  # the head's
+    asks = [lambda time: Intent(np.zeros(channels.size), channels.mask("ee"), time=time)] * 40
+    positions, _, _ = roll(mpc, asks, q)
+    np.testing.assert_allclose(positions[-1][-2:], q[-2:], atol=0.01)
 
 
 def test_a_hand_that_is_steered_to_a_far_pose_is_not_led_into_a_corner():
