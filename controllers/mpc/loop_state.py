@@ -36,7 +36,8 @@ class LoopState(NamedTuple):
     planned: float = 0.0  # how long the command follows its plan [s]
     rest: FloatArray | None = None
     """Where joints stay that nobody steers, (n,); NaN of the others. None where all joints move each hand."""
-    paired: tuple[bool, bool] = False, False  # whether two hands are being steered as a pair, and parted
+    paired: tuple[bool, bool, bool] = False, False, False
+    """Whether two hands are being steered as a pair, parted, and one of them by itself."""
     active: IntArray = NOTHING_ACTIVE
     """Names of the rows that were active in the last problem among these pairs."""
 

@@ -107,16 +107,14 @@ class MaskedMpc:
         return self._builder.build(self._facing(self.loop, state, intent), state, intent)
 
     def _facing(self, loop: LoopState, state: State, intent: Intent) -> LoopState:
-        """Return the loop's state in which a problem is built; a pair is kept as it begins, or was parted."""
+        """Return the loop's state in which a problem is built; a pair stays as it is at a new mask."""
         if not self.channels.pair:
             return loop.facing(state, intent, self.channels)
-        pair = intent.mask[self.channels.pair_slice]
-        steered = bool(pair.any()), bool(pair[-1])
+        mask, pair, base = intent.mask, self.channels.pair_slice, len(self.channels.base)
+        steered = bool(mask[pair].any()), bool(mask[pair][-1]), bool(mask[base : pair.start].any())
         if steered[0] and steered != loop.paired:
-            parameters = loop.parameters.copy()
-            parameters[self.residuals.parameter_slice(TOGETHER)] = together_parameters(
-                self.model, state.expected
-            )
+            parameters, place = loop.parameters.copy(), self.residuals.parameter_slice(TOGETHER)
+            parameters[place] = together_parameters(self.model, state.expected)
             loop = loop._replace(parameters=parameters)
         return loop.facing(state, intent, self.channels)._replace(paired=steered)
 

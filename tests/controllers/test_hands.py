@@ -124,6 +124,17 @@ def test_a_pair_is_kept_as_it_begins_while_the_base_drives(mpc):
     assert driven.brakes == 0
 
 
+def test_a_pair_stays_as_one_of_its_hands_was_moved(mpc):
+    driven, begun = Driven(mpc), together_parameters(MODEL, HOME)
+    driven.steer(("pair",), [0.0] * 6, 0.5)
+    driven.steer(("pair", "left"), [0.0, 0.1, *[0.0] * 10], 1.5)
+    before = together_parameters(MODEL, driven.state.q)
+    driven.steer(("pair",), [0.0] * 6, 2.0)
+    after = together_parameters(MODEL, driven.state.q)
+    assert np.linalg.norm(before[:3] - begun[:3]) > 0.08
+    assert np.linalg.norm(after[:3] - before[:3]) < 0.02
+
+
 def test_the_plain_controller_keeps_a_pair(mpc):
     driven, before = Driven(mpc), together_parameters(MODEL, HOME)
     driven.steer(("pair",), [0.2, *[0.0] * 5], 4.0)
