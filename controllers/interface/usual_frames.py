@@ -45,6 +45,8 @@ def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent 
         if intent.mask[0] != intent.mask[1]:
             return None
         values[:3] = turned(values[:3], -q[2])
+    if frames.tool == "world" and not frames.point.any():  # hands already are in the usual frame
+        return replace(intent, values=values, frames=_USUAL)
     poses = [model.pose(q, hand.named("tool")) for hand in model.description.hands]
     places = [channels.hand_slice(hand) for hand in range(len(poses))]
     if channels.pair:  # in the axes of the first hand

@@ -95,6 +95,22 @@ def test_a_twist_with_missing_axes_of_its_own_frame_has_no_usual_one(robot, fram
 
 
 @both
+def test_a_hand_that_is_in_its_usual_frame_needs_no_turn(robot):
+    """Some axes of it, beside a base that is meant in the world."""
+    model = ROBOTS[robot][0]
+    channels = channels_of(model)
+    hand = channels.hands[-1][0].split(".")[0]
+    mask = channels.mask("base", f"{hand}.vx", f"{hand}.wz")
+    asked = Intent(0.1 * mask, mask, frames=Frames(base="world"))
+    usual = in_usual_frames(asked, model, np.ones(model.size))
+    assert usual is not None
+    np.testing.assert_array_equal(usual.values[3:], asked.values[3:])
+    np.testing.assert_allclose(
+        usual.values[:2], 0.1 * np.array([np.cos(1) + np.sin(1), np.cos(1) - np.sin(1)])
+    )
+
+
+@both
 @pytest.mark.parametrize("build", [unprotected_controller, CbfFilter])
 def test_controllers_of_any_mask_do_the_same_in_any_frame(robot, build):
     """And brake where only its own frame can say what is asked."""
