@@ -11,7 +11,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.model import Pose, RobotModel, joints_of
 
 Completion = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 """q (n,), velocity commanded last (n,), twist (6,), period [s] → velocity wanted (n,) [m/s, rad/s].
@@ -21,22 +21,26 @@ The twist is (v, ω), world-aligned at the tool point.
 
 
 class WholeBodyCompletion:
-    """Damped least squares, `v = argmin ‖J v − twist‖² + λ ‖W v‖²`, `W = diag(1 / v_max)`; a completion.
+    """Damped least squares, `v = argmin ‖L (J v − twist)‖² + λ ‖W v‖²`, `W = diag(1 / v_max)`; a completion.
 
     Args:
         model: of the robot.
         damping: λ.
         weights: the diagonal of λ W² instead, (n,).
+        length: that weighs as much as one radian [m]: L divides the translation by it.
     """
 
-    def __init__(self, model: RobotModel, damping: float = 0.01, weights: FloatArray | None = None) -> None:
-        self._model = model
+    def __init__(
+        self, model: RobotModel, damping: float = 0.01, weights: FloatArray | None = None, length: float = 1.0
+    ) -> None:
+        self._model, self._rows = model, np.repeat([1.0 / length, 1.0], 3)
         usual = model.description.limits.velocity**2 / damping
         self._inverse = usual if weights is None else 1.0 / weights  # of λ W², (n,)
 
     def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:
         """Return the velocity, (n,)."""
-        return damped_least_squares(self._model.jacobian(q), twist, self._inverse)
+        matrix = self._rows[:, None] * self._model.jacobian(q)
+        return damped_least_squares(matrix, self._rows * twist, self._inverse)
 
 
 def damped_least_squares(matrix: FloatArray, values: FloatArray, inverse: FloatArray) -> FloatArray:
@@ -103,7 +107,8 @@ def base_first_controller(model: RobotModel, period: float = 0.05) -> TwistContr
     settings = MpcSettings.of(model.description.world.scale)
     arm = np.arange(model.size) >= len(model.description.base.joints)
     weights = np.where(arm, settings.arm_velocity, settings.base_velocity) / settings.tracking
-    return TwistController(model, WholeBodyCompletion(model, weights=weights), period)
+    weights /= np.where([joint.prismatic for joint in joints_of(model)], settings.length**2, 1.0)
+    return TwistController(model, WholeBodyCompletion(model, weights=weights, length=settings.length), period)
 
 
 def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArray:

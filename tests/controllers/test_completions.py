@@ -27,13 +27,17 @@ from handrail.controllers.baselines.arm_completion import (
 )
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, tool_twist
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.build import built_in_objectives
 from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
+from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.registry import resolved
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.scripts.bench.goal_reaching.config import BASELINES
 
@@ -225,6 +229,21 @@ def test_the_base_goes_first_by_the_mpc_s_weights():
         shares[name] = v[-1][:2] @ twist[:2] / (twist @ twist)
     assert shares["dls_base"] > 0.85
     assert shares["dls"] < 0.7
+
+
+@pytest.mark.parametrize("robot", ["ridgeback_ur10", "lekiwi"])
+def test_the_mpc_s_weights_are_those_of_the_robot_s_size(robot):
+    model = load_model(robot)
+    channels, weights = Channels.of(model.description), MpcSettings.of(model.description.world.scale)
+    tracking, velocity, *_ = built_in_objectives(model, channels, weights)
+    mask, values = channels.mask("ee"), np.zeros(channels.size)
+    values[3] = 0.002
+    asks = [lambda time: Intent(values, mask, time=time)] * 10
+    q, v, _ = roll(build_controller(MODES["ee_dls_base"], model, 20.0), asks, model.description.home)
+    weighed = model.jacobian(q[-1]).T * tracking.weights(mask)[channels.hand_slice()]
+    hessian = weighed @ model.jacobian(q[-1]) + np.diag(velocity.weights(mask))
+    expected = np.linalg.solve(hessian, weighed @ values[channels.hand_slice()])
+    np.testing.assert_allclose(v[-1], expected, atol=1e-5)
 
 
 def test_where_mink_is_missing_a_line_says_so_and_people_are_not_offered_it(monkeypatch):
