@@ -35,6 +35,7 @@ export class Inputs {
     this.grips = [false]; // which grippers shall be closed, one a hand
     this.parts = {}; // what parts of axes stand for, where there are several hands
     this.bank = 0; // which of what they can move the sticks move
+    this.isShared = false; // with a policy
     this.hasFocus = document.hasFocus();
     this.listen();
   }
@@ -46,6 +47,18 @@ export class Inputs {
     addEventListener("focus", () => { this.hasFocus = true; });
     document.addEventListener("visibilitychange", () => { if (document.hidden) this.release(this.hasFocus); });
     addEventListener("pagehide", () => this.release(false));
+    for (const event of ["pointerdown", "focusin"]) addEventListener(event, ({ target }) => { if (target.closest?.("select")) this.giveKeys(); }, true);
+    addEventListener("dragstart", () => this.giveKeys(), true);
+    addEventListener("contextmenu", (event) => { // not while a thumb rests on a stick
+      if (event.target.closest?.("#sticks")) event.preventDefault();
+      else if (!event.defaultPrevented) this.giveKeys();
+    });
+  }
+
+  // A list, a menu or a drag of the browser takes all keys, also when they go up; with them nobody could stop a policy.
+  giveKeys() {
+    this.release(this.hasFocus);
+    if (this.isShared) this.act("pause");
   }
 
   get entries() {

@@ -54,6 +54,7 @@ const link = new Link({
   stage: async (said) => {
     stage = said;
     inputs.mapping = new Mapping(stage);
+    inputs.isShared = Boolean(stage.policy);
     groups = digitGroups(stage);
     if (inputs.grips.length !== stage.hands.length) inputs.grips = stage.hands.map(() => false);
     for (const each of [panels, masks, sliders, episodes, study, decision, xr]) each.stage(stage);

@@ -74,6 +74,17 @@ def test_nothing_is_held_once_a_meta_key_is_down(on_bench):
     made.wait(lambda intent: intent.raw.axes == 0)
 
 
+@pytest.mark.parametrize("button", ["left", "right"])
+def test_nothing_is_held_once_a_list_or_a_menu_is_open(on_bench, button):
+    """The browser gives it all keys, also those that go up."""
+    made, driver = on_bench()
+    driver.begin()
+    driver.page.keyboard.down("KeyW")
+    made.wait(lambda intent: intent.raw.axes == 1)
+    driver.page.locator("#mode" if button == "left" else "#said").click(button=button, force=True)
+    made.wait(lambda intent: intent.raw.axes == 0)
+
+
 @pytest.mark.parametrize("with_key", ["Control", "Alt", "Shift"])
 def test_the_stop_counts_with_another_key_too(on_bench, with_key):
     _, driver = on_bench()

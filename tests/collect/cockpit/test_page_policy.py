@@ -102,6 +102,12 @@ def test_stop_and_pause_brake_the_policy_until_the_person_goes_on(driven, witnes
     go(driver, witness)
 
 
+def test_a_policy_pauses_while_a_list_has_the_keys(driven, witness):
+    driver, _ = driven
+    driver.page.locator("#mode").click()
+    stays_still(witness, "paused")
+
+
 def test_a_lost_link_brakes_the_policy_and_it_does_not_go_on_by_itself(driven, witness):
     """Nothing was held when the cable was pulled; when it is back, nothing is."""
     driver, relay = driven
