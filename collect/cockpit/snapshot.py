@@ -67,7 +67,7 @@ class Snapshots:
         self._nearest = NearestPair(env.simulation.mujoco_model)
         self._frame: Frame | None = None
         self._undo_to = self._time = 0.0  # the moment that an undo goes back to, and the last one [s]
-        self._undos = 0
+        self._undos, self._rests = 0, False  # whether the robot has come to rest, and has not gone on yet
 
     def see(self, frame: Frame) -> None:
         """Take how the controller fared."""
@@ -85,8 +85,10 @@ class Snapshots:
         if state.time < self._time:  # after an undo: what the frame shows has never been
             self._frame, self._undos = None, self._undos + 1
         self._time = state.time
-        if person.phase is not Phase.DRIVING and not np.any(state.commanded):
-            self._undo_to = state.time
+        if person.phase is not Phase.DRIVING:
+            self._rests |= not np.any(state.commanded)
+        elif self._rests:
+            self._undo_to, self._rests = state.time, False
         return {
             "stamp": round(stamp, 4),
             "time": round(state.time, 3),

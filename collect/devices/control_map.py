@@ -46,7 +46,7 @@ ACTIONS: Mapping[str, str] = {
     "faster": "faster",
     "slower": "slower",
     "speed": "next speed",
-    "undo": "back to the last pause",
+    "undo": "back to where you went on last",
     "success": "end it: success",
     "failure": "end it: failure",
     "restart": "throw away, begin it again",

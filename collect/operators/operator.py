@@ -38,7 +38,7 @@ class EpisodeEvent(StrEnum):
     DISCARD = "discard"  # throw it away, go on with another one
     RESTART = "restart"  # throw it away, begin the same one again
     QUIT = "quit"  # throw it away, and record no more
-    UNDO = "undo"  # back to where they paused last, or to the beginning; what came after is forgotten
+    UNDO = "undo"  # back to where they went on last, or to the beginning; what came after is forgotten
     PAUSE = "pause"  # stand still; said at every call until it goes on
 
     @property

@@ -68,7 +68,7 @@ class Undo:
 
     def __init__(self, loop: EpisodeLoop, sampling: Sampling) -> None:
         self._loop = loop
-        self._take(sampling)
+        self.mark(sampling)
 
     @property
     def safe(self) -> int:
@@ -76,24 +76,16 @@ class Undo:
         return self._sampling.number
 
     def mark(self, sampling: Sampling) -> None:
-        """Take note of this moment, to come back to; the robot rests."""
-        if self._moved:
-            self._take(sampling)
+        """Take note of this moment, to come back to; the robot rested, and goes on."""
+        self._world, self._frames = self._loop.checkpoint(), self._loop.tally.frames
+        self._sampling = copy(sampling)
 
     def back(self, sampling: Sampling) -> Sampling:
         """Go back to the last mark; return the recording's sampling of then."""
-        if not self._moved:
+        if self._loop.tally.frames == self._frames:
             return sampling
         self._loop.restore(self._world)
         return copy(self._sampling)
-
-    @property
-    def _moved(self) -> bool:
-        return self._loop.tally.frames > self._frames
-
-    def _take(self, sampling: Sampling) -> None:
-        self._world, self._frames = self._loop.checkpoint(), self._loop.tally.frames
-        self._sampling = copy(sampling)
 
 
 class Observer(Protocol):
@@ -153,7 +145,7 @@ class Session:
         """Run an episode that has begun; return what the operator said to end it."""
         sampling = Sampling(self.record_period or self.env.period)
         undo = Undo(loop, sampling) if self.undoes else None
-        asked, event = Intent.idle(Channels.of(self.env.model.description)), None
+        asked, event, rested = Intent.idle(Channels.of(self.env.model.description)), None, False
         while not loop.now.done:
             view = loop.look()
             with loop.tally.timed("operator"):
@@ -170,13 +162,16 @@ class Session:
                 sampling = undo.back(sampling)
             elif event is EpisodeEvent.PAUSE and loop.rests:
                 loop.rest()
-                if undo:
+                rested = True
+            else:
+                if undo and rested:  # an undo in a pause goes back to where the robot set out
                     undo.mark(sampling)
-            elif frame := sampling.add(loop.step(asked, event), loop.time):
-                frame = replace(frame, safe=undo.safe) if undo else frame
-                with loop.tally.timed("observers"):
-                    for observer in self.observers:
-                        observer.see(frame)
+                rested = False
+                if frame := sampling.add(loop.step(asked, event), loop.time):
+                    frame = replace(frame, safe=undo.safe) if undo else frame
+                    with loop.tally.timed("observers"):
+                        for observer in self.observers:
+                            observer.see(frame)
             if self.realtime:
                 loop.tally.pace()
         return event if event and (event.judges or event.drops) else None  # else the task has ended it

@@ -42,7 +42,7 @@ export const ACTIONS = {
   failure: { says: "failed", key: "ArrowDown", button: 13 },
   restart: { says: "again from the start", key: "ArrowLeft", button: 2 },
   discard: { says: "throw away", key: "Backspace", button: 16 },
-  undo: { says: "undo, to the last pause", key: "Backquote", button: 12 },
+  undo: { says: "undo, to where you went on last", key: "Backquote", button: 12 },
   quit: { says: "end the recording", key: "End", button: -1 },
   focus: { says: "base or hand", key: "KeyB", button: 11 },
   mode: { says: "next mode", key: "BracketRight", button: 8 },

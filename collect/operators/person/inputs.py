@@ -42,7 +42,7 @@ ASKS: Mapping[str, type] = {
     "discard": bool,
     "restart": bool,
     "quit": bool,
-    "undo": bool,  # back to the last pause, or the beginning
+    "undo": bool,  # back to where they went on last, or the beginning
     "practice": bool,
     "mode": str,
     "mask": list,  # of channels that the operator wants to own, whatever the mode says

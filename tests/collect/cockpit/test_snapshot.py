@@ -188,18 +188,20 @@ def test_drivers_are_said_beside_a_policy_alone_and_only_while_the_robot_is_driv
     assert not policys()
 
 
-def test_an_undo_takes_what_came_after_the_last_rest(env, person):
+def test_an_undo_takes_what_came_since_the_robot_went_on(env, person):
     snapshots, now = Snapshots(env), view(env)
     at = lambda time, moving: replace(  # noqa: E731
         now, state=replace(now.state, time=time, commanded=np.full(env.model.size, float(moving)))
     )
     assert snapshots.now(at(0.0, False), person, 0.0)["undo_takes"] == 0.0
     person.ask(Ask("start"))
+    assert snapshots.now(at(0.0, False), person, 0.0)["undo_takes"] == 0.0
     assert snapshots.now(at(3.0, True), person, 0.0)["undo_takes"] == 3.0
     person.ask(Ask("pause"))
     assert snapshots.now(at(4.0, True), person, 0.0)["undo_takes"] == 4.0  # still braking
-    assert snapshots.now(at(4.5, False), person, 0.0)["undo_takes"] == 0.0
+    assert snapshots.now(at(4.5, False), person, 0.0)["undo_takes"] == 4.5  # in the pause, too
     person.ask(Ask("start"))
+    assert snapshots.now(at(4.5, False), person, 0.0)["undo_takes"] == 0.0
     assert snapshots.now(at(6.0, True), person, 0.0)["undo_takes"] == 1.5
 
 

@@ -1,4 +1,4 @@
-"""Laws: after an undo all goes on from the last pause as if nothing had been since, and the data say so."""
+"""Laws: an undo goes back to where the robot went on last, as if nothing had been since; the data say so."""
 
 import io
 import math
@@ -84,8 +84,11 @@ def recorded(root, plan, plant, robot_fps=FPS, watchers=(), **options):
 
 @pytest.mark.parametrize("plant", [Simulation, IdealRobot])
 @pytest.mark.parametrize("robot_fps", [FPS, 3 * FPS])
-def test_undone_frames_are_not_recorded(tmp_path, plant, robot_fps):
-    frames, outcome = recorded(tmp_path / "undone", UNDONE, plant, robot_fps)
+@pytest.mark.parametrize("pause", [0, 1, 30])
+def test_undone_frames_are_not_recorded(tmp_path, plant, robot_fps, pause):
+    """An undo in a pause takes back what came before the pause, whether the robot rests already or brakes."""
+    undone = [*UNDONE[:3], (PAUSE, pause), *UNDONE[3:]]
+    frames, outcome = recorded(tmp_path / "undone", undone, plant, robot_fps)
     plain, _ = recorded(tmp_path / "plain", PLAIN, plant, robot_fps)
     assert outcome.undos == 1
     assert len(frames["action"]) == len(plain["action"])
