@@ -63,7 +63,7 @@ const link = new Link({
     label();
     await view.stage(stage);
   },
-  frame: (said) => { frame = said; say(); }, // answered at once: so the server knows how long that takes
+  frame: (said) => { frame = said; panels.seen = performance.now(); say(); }, // answered at once: so the server knows how long that takes
 });
 const panels = new Panels(link);
 const masks = new Masks(link);

@@ -10,9 +10,13 @@ const NEEDS = {
   choices: ["mode", "frame", "speed", "one-joint"],
 };
 
+const SILENT = 2000; // without a frame [ms]
+
 export class Panels {
   constructor(link) {
     this.link = link;
+    this.seen = Infinity; // when the newest frame came [ms]
+    setInterval(() => this.state(), SILENT / 4);
     this.you = { driving: false, free: true, pages: 1 };
     this.isConnected = true;
     this.over = this.newest = null;
@@ -106,7 +110,8 @@ export class Panels {
   // Say in which state the page is; what the driver may do depends on it.
   state() {
     const { isConnected, over, newest: frame, you } = this;
-    const { name, chip, banner } = stateOf({ isConnected, over, frame, isDriver: you.driving, isLate: you.late });
+    const isSilent = performance.now() - this.seen > SILENT && byId("study")?.hidden !== false; // while a card is open there are no frames
+    const { name, chip, banner } = stateOf({ isConnected, over, frame, isDriver: you.driving, isLate: you.late, isSilent });
     document.body.dataset.phase = name;
     document.body.classList.toggle("spectator", !you.driving);
     set("phase", chip);

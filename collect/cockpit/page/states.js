@@ -8,6 +8,7 @@ const STATES = {
   watching: ["you watch", ""],
   lost: ["no input: let go of everything", "Let go of everything. The robot stands still. Once all is let go, drive on."],
   stopped: ["STOPPED", "The robot is stopped. Look at it first. Then press Release."],
+  silent: ["nothing new", "Nothing new for some seconds: an episode is being saved, or the connection hangs. What you see is old."],
   offline: ["no connection", "No connection. The robot brakes. Trying again …"],
 };
 const LATE = "Too slow a connection to drive: what you see is older than 0.3 s.";
@@ -16,9 +17,10 @@ const WATCHED = {
   ready: "you watch: not begun", driving: "you watch: recording", paused: "you watch: paused", lost: "you watch: no input",
 };
 
-function nameOf({ isConnected, isDriver, frame }) {
+function nameOf({ isConnected, isDriver, isSilent, frame }) {
   if (!isConnected) return "offline";
   if (!frame) return "preparing";
+  if (isSilent) return "silent";
   if (!isDriver && frame.phase in WATCHED) return "watching";
   return frame.phase === "driving" && frame.practice ? "practice" : frame.phase;
 }

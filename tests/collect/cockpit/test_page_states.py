@@ -1,5 +1,8 @@
 """Laws of what the page says: each state has its words and look; `HANDRAIL_SHOTS` keeps pictures."""
 
+import os
+import signal
+
 import pytest
 from page_driver import LOST
 from page_shots import shoot
@@ -64,6 +67,22 @@ def test_a_refused_message_is_said_on_the_page_and_a_cut_is_seen(on_bench):
     page.evaluate("socket.close()")
     driver.expect_phase("no connection")
     shoot(page, "reconnecting")
+
+
+def test_a_page_that_hears_nothing_new_says_so(on_bench):
+    made, driver = on_bench()
+    driver.begin()
+    os.kill(made._server.process.pid, signal.SIGSTOP)
+    try:
+        driver.expect_phase("nothing new")
+        expect(driver.at("banner")).to_contain_text("What you see is old")
+    finally:
+        os.kill(made._server.process.pid, signal.SIGCONT)
+    expect(driver.at("phase")).not_to_have_text("nothing new")
+    driver.press("KeyP")
+    driver.expect_phase("paused")
+    driver.page.wait_for_timeout(4000)  # a pause is no silence
+    assert driver.phase == "paused"
 
 
 def test_a_countdown_starts_the_episode_and_any_action_ends_it(on_bench):
