@@ -6,6 +6,7 @@ waits: what the server does not take at once is dropped. When the loop is late, 
 
 import io
 import math
+import sys
 import time
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
@@ -51,6 +52,7 @@ class Cockpit:
 
     Attributes:
         person: whoever steers.
+        trouble: why the recording ended early; the page says it at the end.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Cockpit:
         config: RecordConfig | None = None,
     ) -> None:
         self.person, self._server, self._refuses, self._say = person, server, refuses, say
+        self.trouble = ""
         self._folder = str(config.dataset.folder) if config else ""
         self._next = next_commands(Path(self._folder)) if self._folder else []
         self._wanted = config.dataset.num_episodes if config else 0
@@ -125,9 +128,9 @@ class Cockpit:
         if self._all_dropped:
             counts = ", ".join(f"{count} {why}" for why, count in self._all_dropped.items())
             self._say(f"dropped or refused by the page's server: {counts}")
-        saved = self._episodes.saved
-        after = self._next if saved else []
-        self._server.pipe.send_surely(Kind.OVER, {"saved": saved, "folder": self._folder, "next": after})
+        over = {"saved": self._episodes.saved, "folder": self._folder, "next": self._next}
+        trouble = self.trouble or str(sys.exception() or "")  # an error of the program, too
+        self._server.pipe.send_surely(Kind.OVER, over | {"trouble": trouble})
         self._server.close()
 
     @property

@@ -17,6 +17,7 @@ from handrail.collect.operators.operator import Operator
 from handrail.collect.session.build import build_env, build_mode
 from handrail.collect.session.display import Display
 from handrail.collect.world.env import HandrailEnv
+from handrail.controllers.errors import FAILED
 from handrail.controllers.registry import resolved
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
@@ -85,6 +86,8 @@ def _record_here(
         ):
             for _ in recording.episodes(writer, writer.num_episodes + count, log.add):
                 bar.show(completed=len(log.outcomes), words=log.words)
+        if interactive and log.exit_code == FAILED:
+            person.trouble = log.trouble  # a page says it
         return writer.root, writer.num_episodes, writer.num_frames
 
 

@@ -25,14 +25,16 @@ function nameOf({ isConnected, isDriver, isSilent, frame }) {
   return frame.phase === "driving" && frame.practice ? "practice" : frame.phase;
 }
 
-function overWords({ saved, folder, next }) {
-  if (!saved) return "Recording is over: no episode was saved.";
-  const what = `Recording is over: ${saved} ${saved === 1 ? "episode" : "episodes"}${folder ? ` in ${folder}` : ""}.`;
-  return next.length ? `${what}\nNext:\n${next.join("\n")}` : what;
+function overWords({ saved, folder, next, trouble }) {
+  const kept = saved ? `${saved} ${saved === 1 ? "episode" : "episodes"}${folder ? ` in ${folder}` : ""}.` : "no episode was saved.";
+  if (trouble) return `The recording ended with an error: ${trouble}\nSaved before: ${kept}`;
+  const what = `Recording is over: ${kept}`;
+  return saved && next.length ? `${what}\nNext:\n${next.join("\n")}` : what;
 }
 
 // Returns {name, chip, banner}; `frame` is the newest one and `over` what the recording said at its end, if they are there.
 export function stateOf(now) {
+  if (now.over?.trouble) return { name: "failed", chip: "no connection: the recording failed", banner: overWords(now.over) };
   if (now.over) return { name: "over", chip: "no connection: recording is over", banner: overWords(now.over) };
   const name = nameOf(now), [chip, banner] = STATES[name];
   const isPractice = name === "watching" && now.frame.practice && now.frame.phase === "driving";

@@ -2,6 +2,7 @@
 
 import io
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +13,14 @@ from PIL import Image
 from handrail.collect.cockpit import cockpit
 from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.strain import Strain
-from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.collect.commands.record import record
+from handrail.collect.config import DatasetConfig, DriveConfig, FoundDatasetConfig, RecordConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.recording.writer import EpisodeWriter
+
+ENDS = (Kind.ASK, "start"), (Kind.STILL, "failure")  # of an episode at once
 
 
 class Server:
@@ -70,6 +76,23 @@ def test_in_a_pause_pictures_are_of_now(opened):
         pixels = {"front": np.full((32, 48, 3), level, np.uint8)}
         person.act(replace(view, observation={"pixels": pixels}))
         assert shade(server.of(Kind.PICTURE)[-1]) == pytest.approx(level, abs=3)
+
+
+@pytest.mark.parametrize("error", [HandrailError("no room"), ValueError("no room"), KeyboardInterrupt()])
+def test_the_page_hears_why_a_recording_ended(tmp_path, monkeypatch, error):
+    def fails(*_):
+        raise error
+
+    server = Server()
+    server.receive = lambda: [(kind, {"what": what, "value": True}) for kind, what in ENDS]
+    monkeypatch.setattr(server, "close", lambda: None, raising=False)
+    monkeypatch.setattr(cockpit, "open_server", lambda config, say: server)
+    monkeypatch.setattr(EpisodeWriter, "save_episode", fails)
+    place = FoundDatasetConfig(place=str(tmp_path / "d"), num_episodes=1)
+    with suppress(ValueError):
+        record(DriveConfig(mode="direct", dataset=place))
+    (over,) = server.of(Kind.OVER)
+    assert (over["saved"], over["trouble"]) == (0, str(error))
 
 
 @pytest.mark.parametrize("real", [False, True])

@@ -85,6 +85,16 @@ def test_a_page_that_hears_nothing_new_says_so(on_bench):
     assert driver.phase == "paused"
 
 
+@pytest.mark.parametrize("trouble", ["", "no room"])
+def test_the_end_says_whether_it_was_an_error(on_bench, trouble):
+    made, driver = on_bench()
+    driver.expect_phase("ready: press Start")
+    made.cockpit.trouble = trouble
+    made.close()
+    expect(driver.page.locator("body")).to_have_attribute("data-phase", "failed" if trouble else "over")
+    expect(driver.at("banner")).to_contain_text(f"an error: {trouble}" if trouble else "Recording is over")
+
+
 def test_a_countdown_starts_the_episode_and_any_action_ends_it(on_bench):
     _, driver = on_bench()
     driver.at("countdown-wanted").check()
