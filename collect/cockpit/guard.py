@@ -12,7 +12,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 
-COOKIE = "handrail_session"
 _LASTS = 12 * 3600.0  # a session [s]
 _FAILURES, _WITHIN = 5, 60.0  # wrong tokens from one address, in a time [s]
 _MOST_FAILURES = 1000  # that are remembered, of all addresses
@@ -44,7 +43,8 @@ class Guard:
 
     def admits(self, headers: Mapping[str, str], cookies: Mapping[str, str], address: str) -> bool:
         """Whether a request may see more than the door."""
-        fine = self.is_ours(headers) and (self._private or self._is_known(cookies.get(COOKIE, ""), address))
+        known = self._private or self._is_known(cookies.get(cookie_name(headers), ""), address)
+        fine = self.is_ours(headers) and known
         self.refused += not fine
         return fine
 
@@ -82,6 +82,11 @@ class Guard:
 
     def _signed(self, *words: str) -> str:
         return hmac.new(self._secret, "\n".join(words).encode(), hashlib.sha256).hexdigest()[:43]
+
+
+def cookie_name(headers: Mapping[str, str]) -> str:
+    """Return the name of a session's cookie: a computer has one name for the servers of all its ports."""
+    return f"handrail_session_{headers.get('host', '').rpartition(':')[2].rstrip(']')}"
 
 
 def _is_address(host: str) -> bool:

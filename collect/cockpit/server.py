@@ -23,7 +23,7 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from handrail.collect.cockpit.guard import COOKIE, Guard
+from handrail.collect.cockpit.guard import Guard, cookie_name
 from handrail.collect.cockpit.http import Http, Server
 from handrail.collect.cockpit.hub import Hub
 from handrail.collect.cockpit.messages import LARGEST
@@ -98,7 +98,8 @@ class Site:
         if session := self._guard.log_in(await _short_body(request), address):
             answer = JSONResponse({}, headers=_HEADERS)
             secure = request.url.scheme == "https"
-            answer.set_cookie(COOKIE, session, httponly=True, samesite="strict", secure=secure)
+            name = cookie_name(request.headers)
+            answer.set_cookie(name, session, httponly=True, samesite="strict", secure=secure)
             return answer
         if self._guard.guesses(address):  # whoever guesses waits; of too many at once nobody
             if self._pauses >= _MOST_PAUSES:

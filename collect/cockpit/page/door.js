@@ -31,4 +31,5 @@ door.addEventListener("submit", async (event) => {
   else document.getElementById("door-error").textContent = "That is not the token. The terminal says the address with it.";
 });
 
+addEventListener("hashchange", () => location.reload()); // the address with the token, in the same tab
 begin();

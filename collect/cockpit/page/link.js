@@ -12,6 +12,12 @@ function pageName() {
   return name;
 }
 
+// A session that has ended looks like a broken connection: the page's door asks for the token.
+async function enterAgain() {
+  const answer = await fetch("/link.js", { method: "HEAD" }).catch(() => null);
+  if (answer?.status === 403) location.reload();
+}
+
 export class Link {
   // handlers: {stage, frame, you, error, picture, connected, over}
   constructor(handlers) {
@@ -29,8 +35,10 @@ export class Link {
     this.socket = new WebSocket(`${scheme}://${location.host}/drive?page=${pageName()}`);
     this.socket.binaryType = "arraybuffer";
     this.sequence = 0;
-    this.socket.onopen = () => this.handlers.connected(true);
+    let wasOpen = false;
+    this.socket.onopen = () => { wasOpen = true; this.handlers.connected(true); };
     this.socket.onclose = (event) => {
+      if (!wasOpen) enterAgain();
       if (event.code === REPLACED) sessionStorage.removeItem("page");
       if (this.isOver) return;
       this.handlers.connected(false);

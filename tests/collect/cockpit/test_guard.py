@@ -1,14 +1,17 @@
 """Laws: who knows the token comes in, from the page's own address, with a few tries a minute; nobody else."""
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.collect.cockpit.guard import COOKIE, Guard
+from handrail.collect.cockpit.guard import Guard, cookie_name
 from handrail.collect.cockpit.lease import Lease
 
 HOST = "192.168.1.20:8765"
 HERE = {"host": HOST, "origin": f"https://{HOST}"}
+COOKIE = cookie_name(HERE)
 
 
 class Clock:
@@ -45,6 +48,14 @@ def test_a_session_outlives_a_server_that_is_started_again(guard, clock):
     assert again.token == guard.token
     assert again.admits(HERE, {COOKIE: session}, "10.0.0.1")
     assert not Guard(False, "https", "another", clock).admits(HERE, {COOKIE: session}, "10.0.0.1")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:{}", "localhost:{}", "[::1]:{}", "10.0.0.1"])
+def test_each_server_of_a_computer_has_a_session_of_its_own(host):
+    """A browser sends the cookies of a computer to the servers of all its ports."""
+    names = {cookie_name({"host": host.format(port)}) for port in (8765, 8766)}
+    assert len(names) == 1 + ("{}" in host)
+    assert all(re.fullmatch(r"[\w.]+", name) for name in names)
 
 
 @given(st.text(max_size=90))

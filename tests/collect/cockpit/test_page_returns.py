@@ -1,6 +1,8 @@
 """Laws of the real page: who comes back goes on; who comes second watches, until they are given the wheel."""
 
 import json
+import os
+import signal
 import time
 
 import numpy as np
@@ -92,3 +94,18 @@ def test_the_page_says_stop_until_it_is_so(new_page):
         assert {each["what"] for each in said} == {"stop"}
         assert len({each["press"] for each in said}) == 1
         page.close()
+
+
+def test_the_door_opens_to_the_address_with_the_token_and_asks_again(new_page):
+    """In the same tab; a session that has ended is no broken connection."""
+    with server(token=True) as made:
+        page = new_page()
+        page.goto(made.address.split("#")[0])
+        expect(page.locator("#door")).to_be_visible()
+        page.goto(made.address)
+        expect(page.locator("#door")).to_be_hidden()
+        expect(page.locator("#phase")).to_contain_text("getting ready")
+        page.context.clear_cookies()
+        os.kill(made.process.pid, signal.SIGKILL)
+        heard(made, {Kind.NOTE})  # another one begins
+        expect(page.locator("#door")).to_be_visible()

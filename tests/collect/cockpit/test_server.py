@@ -3,7 +3,9 @@
 import json
 import socket as sockets
 import time
+import urllib.request
 from contextlib import ExitStack, suppress
+from http.cookiejar import CookieJar
 
 import pytest
 from cockpit_helpers import ask, drive, heard, page, seen, server, show, stage, told
@@ -164,6 +166,19 @@ def test_the_token_can_be_asked_for_on_this_computer_too():
         assert status == 200
         with page(made, cookie=headers["set-cookie"].split(";")[0]) as socket:
             assert told(socket, "you")["driving"]
+
+
+def test_two_recordings_of_a_computer_let_the_same_browser_in():
+    jar, welcome = CookieJar(), []
+    with server(token=True) as one, server(token=True) as other:
+        for made in (one, other):
+            base, token = made.address.split("/#")
+            opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(jar))
+            opener.open(urllib.request.Request(f"{base}/login", token.encode(), {"Origin": base})).close()
+        for made in (one, other):
+            with page(made, cookie="; ".join(f"{each.name}={each.value}" for each in jar)) as socket:
+                welcome.append(told(socket, "you")["driving"])
+    assert welcome == [True, True]
 
 
 def test_no_port_after_the_last_one_is_tried():
