@@ -1,11 +1,13 @@
 """The web server's process: started, told where to listen, started again when it dies, ended."""
 
 import json
+import os
 import secrets
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import webbrowser
 from collections import deque
@@ -147,6 +149,7 @@ def open_server(config: CockpitConfig, say: Callable[[str], None]) -> ServerProc
     """Return a server; say where its page is, and open it where the settings want that."""
     server = ServerProcess(config, say)
     say(f"Drive at {server.address}")
-    if config.open and not config.asks:  # other accounts could read a token on a command line
-        webbrowser.open(server.address)
+    shows = sys.platform != "linux" or {"DISPLAY", "WAYLAND_DISPLAY", "BROWSER"} & os.environ.keys()
+    if config.open and shows and not config.asks:  # other accounts could read a token on a command line
+        threading.Thread(target=webbrowser.open, args=(server.address,), daemon=True).start()
     return server

@@ -2,8 +2,11 @@
 
 import json
 import socket as sockets
+import sys
+import threading
 import time
 import urllib.request
+import webbrowser
 from contextlib import ExitStack, suppress
 from http.cookiejar import CookieJar
 
@@ -13,7 +16,7 @@ from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatu
 
 from handrail.collect.cockpit.page_socket import REPLACED
 from handrail.collect.cockpit.pipe import Kind
-from handrail.collect.cockpit.process import MOST_DEATHS, ServerProcess
+from handrail.collect.cockpit.process import MOST_DEATHS, ServerProcess, open_server
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
@@ -179,6 +182,22 @@ def test_two_recordings_of_a_computer_let_the_same_browser_in():
             with page(made, cookie="; ".join(f"{each.name}={each.value}" for each in jar)) as socket:
                 welcome.append(told(socket, "you")["driving"])
     assert welcome == [True, True]
+
+
+@pytest.mark.parametrize("display", ["", "DISPLAY", "WAYLAND_DISPLAY", "BROWSER"])
+def test_a_browser_opens_where_it_can_be_seen_and_nobody_waits_for_it(monkeypatch, display):
+    """A text browser takes the terminal, for as long as it runs."""
+    opened, goes_on, waited = threading.Event(), threading.Event(), []
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(webbrowser, "open", lambda _: (opened.set(), waited.append(goes_on.wait(20.0))))
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    if display:
+        monkeypatch.setenv(display, "some")
+    open_server(CockpitConfig(port=0), lambda words: None).close()
+    goes_on.set()
+    assert opened.wait(20.0 if display else 0.5) == bool(display)
+    assert False not in waited
 
 
 def test_no_port_after_the_last_one_is_tried():
