@@ -85,6 +85,11 @@ export class Inputs {
       taken(event.code);
       return;
     }
+    if (event.code === "Enter" && (event.repeat || event.target.matches("input[type=checkbox]"))) {
+      event.preventDefault();
+      if (!event.repeat) event.target.click(); // Space, that does it elsewhere, is STOP
+      return; // a key that stays down is one press
+    }
     if (isNative(event.target, event.code)) return;
     const driving = this.entriesInForce().some(([code]) => code === event.code);
     const action = this.mapping.action(event.code);

@@ -3,13 +3,17 @@ const RETRY = 700; // [ms]
 const AGAIN = 200; // between two times that STOP is said [ms]
 const REPLACED = 4001; // this page is open elsewhere too, a copy of the tab: that one drives
 
+let ownName = "";
+
+function keepName(name) {
+  ownName = name;
+  try { sessionStorage.setItem("page", name); } catch { /* not allowed: a reload is another page */ }
+}
+
 function pageName() {
-  let name = sessionStorage.getItem("page");
-  if (!name) {
-    name = Array.from(crypto.getRandomValues(new Uint8Array(12)), (b) => b.toString(16).padStart(2, "0")).join("");
-    sessionStorage.setItem("page", name);
-  }
-  return name;
+  try { ownName = sessionStorage.getItem("page") || ownName; } catch { /* not allowed */ }
+  if (!ownName) keepName(Array.from(crypto.getRandomValues(new Uint8Array(12)), (b) => b.toString(16).padStart(2, "0")).join(""));
+  return ownName;
 }
 
 // A session that has ended looks like a broken connection: the page's door asks for the token.
@@ -39,7 +43,7 @@ export class Link {
     this.socket.onopen = () => { wasOpen = true; this.handlers.connected(true); };
     this.socket.onclose = (event) => {
       if (!wasOpen) enterAgain();
-      if (event.code === REPLACED) sessionStorage.removeItem("page");
+      if (event.code === REPLACED) keepName("");
       if (this.isOver) return;
       this.handlers.connected(false);
       setTimeout(() => this.open(), RETRY);

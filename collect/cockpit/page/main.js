@@ -23,7 +23,7 @@ import { foldPanels } from "./folds.js";
 
 const PERIOD = 25; // between two messages [ms]
 const view = new View(byId("view"), (hand) => ask("hand", hand));
-let stage = null, frame = null, told = null, drawn = null;
+let stage = null, frame = null, told = null, drawn = null, spoken = 0;
 let groups = [], group = 0, active = 0; // of the joints that digits mean; and the hand at that time
 
 const ask = (what, value) => { episodes.cancel(); link.ask(what, value); };
@@ -53,7 +53,7 @@ const link = new Link({
   picture: (index, blob) => panels.picture(index, blob),
   stage: async (said) => {
     stage = said;
-    inputs.mapping = new Mapping(stage);
+    if (inputs.mapping?.name !== new Mapping(stage).name) inputs.mapping = new Mapping(stage); // else it keeps what was changed
     inputs.isShared = Boolean(stage.policy);
     groups = digitGroups(stage);
     if (inputs.grips.length !== stage.hands.length) inputs.grips = stage.hands.map(() => false);
@@ -212,6 +212,7 @@ function tell() {
 }
 
 function say() {
+  spoken = performance.now();
   if (!stage || !view.isReady) return;
   if (frame && frame !== told) tell();
   const input = inputs.read(stage.channels);
@@ -219,6 +220,7 @@ function say() {
   if (panels.you.driving) link.drive({ ...input, view: view.azimuth });
 }
 
-for (const event of ["keydown", "keyup", "blur"]) addEventListener(event, say); // after what inputs make of it
-setInterval(say, PERIOD); // also while a slow machine draws less often than that
+addEventListener("keydown", (event) => { if (!event.repeat) say(); }); // after what inputs make of it
+for (const event of ["keyup", "blur"]) addEventListener(event, say);
+setInterval(() => { if (performance.now() - spoken > PERIOD / 2) say(); }, PERIOD); // also while a slow machine draws less often than that
 requestAnimationFrame(step);

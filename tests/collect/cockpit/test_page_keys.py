@@ -104,6 +104,26 @@ def test_the_stop_does_not_wait_until_the_mouse_button_goes_up(on_bench):
     driver.expect_phase("STOPPED")
 
 
+def test_a_key_that_stays_down_is_one_press_and_ticks_boxes(on_bench):
+    """Without a mouse: Enter ticks, as Space is STOP; on a button it does not release the stop and go on."""
+    _, driver = on_bench()
+    driver.expect_phase("ready: press Start")
+    driver.at("countdown-wanted").focus()
+    driver.press("Enter")
+    assert driver.at("countdown-wanted").is_checked()
+    driver.press("Enter")
+    assert not driver.at("countdown-wanted").is_checked()
+    driver.page.locator("#said").click(force=True)
+    driver.press("Space")
+    driver.expect_phase("STOPPED")
+    driver.at("start").focus()
+    for _ in range(3):
+        driver.page.keyboard.down("Enter")
+        driver.expect_phase("ready: press Start")
+        driver.page.wait_for_timeout(500)
+    driver.expect_phase("ready: press Start")
+
+
 def test_slower_is_never_faster(on_bench):
     _, driver = on_bench()
     expect(driver.at("speed-said")).to_have_text("60 %")
