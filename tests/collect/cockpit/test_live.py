@@ -92,6 +92,7 @@ def test_the_page_hears_why_a_recording_ended(tmp_path, monkeypatch, error):
     with suppress(ValueError):
         record(DriveConfig(mode="direct", dataset=place))
     (over,) = server.of(Kind.OVER)
+    assert isinstance(over, dict)
     assert (over["saved"], over["trouble"]) == (0, str(error))
 
 
