@@ -1,5 +1,6 @@
 // The connection to the server: says where the inputs are, hears what happens; comes back by itself.
 const RETRY = 700; // [ms]
+const RELEASED = 1; // a frame so much newer than a STOP shows what came of it [s]
 const AGAIN = 200; // between two times that STOP is said [ms]
 const REPLACED = 4001; // this page is open elsewhere too, a copy of the tab: that one drives
 
@@ -30,6 +31,7 @@ export class Link {
     this.stamp = 0;
     this.press = 0; // which press of STOP the robot has not answered yet; 0 for none
     this.heard = 0; // which one the server has heard
+    this.heardAt = 0; // the stamp of the frame before that
     setInterval(() => { if (!this.isClogged) this.sayStop(); }, AGAIN);
     this.open();
   }
@@ -61,10 +63,12 @@ export class Link {
     if (said.kind === "over") this.leave();
     if (said.kind === "frame") this.stamp = said.frame.stamp;
     if (said.kind === "heard") {
+      if (this.heard !== said.press) this.heardAt = this.stamp;
       this.heard = said.press;
       return;
     }
-    if (said.frame?.phase === "stopped" && this.heard === this.press) this.press = 0;
+    // Those who watch do not get each frame: of a stop that was released at once there may be none.
+    if (said.kind === "frame" && this.heard === this.press && (said.frame.phase === "stopped" || this.stamp > this.heardAt + RELEASED)) this.press = 0;
     this.handlers[said.kind](said[said.kind] ?? said);
   }
 

@@ -22,7 +22,7 @@ globalThis.WebSocket = class {
 const { Link } = await import(process.argv[1]);
 const link = new Link(new Proxy({}, { get: () => none }));
 const hear = (said) => link.hear(JSON.stringify(said));
-const frame = (phase) => hear({ kind: "frame", frame: { phase, stamp: 1 } });
+const frame = (phase, stamp = 1) => hear({ kind: "frame", frame: { phase, stamp } });
 const again = () => { const before = sockets.at(-1).sent.length; timers.forEach((each) => each());
   return sockets.at(-1).sent.length - before; };
 const found = [];
@@ -40,6 +40,13 @@ frame("driving");
 found.push(again());
 frame("stopped");
 found.push(again());
+link.ask("stop");
+hear({ kind: "heard", press: link.press });
+frame("driving", 1.5);  // may be of before it
+found.push(again());
+hear({ kind: "heard", press: link.press });
+frame("driving", 2.5);  // it was released, and those who watch got no frame of it
+found.push(again());
 console.log(JSON.stringify(found));
 """
 
@@ -49,4 +56,4 @@ def test_a_stop_is_said_until_it_was_heard_and_the_robot_stopped_after_that():
     words = ["--input-type=module", "-e", PAGE, link]
     said = nodejs.node(words, return_completed_process=True, capture_output=True, text=True)
     assert said.returncode == 0, said.stderr
-    assert json.loads(said.stdout) == [1, 1, 1, 0]
+    assert json.loads(said.stdout) == [1, 1, 1, 0, 1, 0]
