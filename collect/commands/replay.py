@@ -152,6 +152,8 @@ def replay_one_of(
         raise HandrailError(f"{where}: the task ended before the first recorded frame")
     states, (_, contacts, success) = np.array([state for state, _, _ in played]), played[-1]
     difference = np.abs(states - recorded[: len(states)])
+    if env.model.description.base.joints:  # a real robot's heading begins anew at ±π
+        difference[:, 2] = np.abs(np.remainder(difference[:, 2] + np.pi, 2.0 * np.pi) - np.pi)
     found = Replay(
         episode=episode,
         names=env.agent_names,

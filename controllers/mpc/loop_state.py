@@ -37,7 +37,7 @@ class LoopState(NamedTuple):
     rest: FloatArray | None = None
     """Where joints stay that nobody steers, (n,); NaN of the others. None where all joints move each hand."""
     paired: tuple[bool, bool, bool] = False, False, False
-    """Whether two hands are being steered as a pair, parted, and one of them by itself."""
+    """Whether two hands are being steered as a pair, parted, and one of them or a joint by itself."""
     active: IntArray = NOTHING_ACTIVE
     """Names of the rows that were active in the last problem among these pairs."""
 

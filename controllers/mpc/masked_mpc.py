@@ -110,8 +110,9 @@ class MaskedMpc:
         """Return the loop's state in which a problem is built; a pair stays as it is at a new mask."""
         if not self.channels.pair:
             return loop.facing(state, intent, self.channels)
-        mask, pair, base = intent.mask, self.channels.pair_slice, len(self.channels.base)
-        steered = bool(mask[pair].any()), bool(mask[pair][-1]), bool(mask[base : pair.start].any())
+        mask, pair, joints = intent.mask, self.channels.pair_slice, self.channels.joint_slice
+        alone = mask[len(self.channels.base) : pair.start].any() or mask[joints].any()
+        steered = bool(mask[pair].any()), bool(mask[pair][-1]), bool(alone)
         if steered[0] and steered != loop.paired:
             parameters, place = loop.parameters.copy(), self.residuals.parameter_slice(TOGETHER)
             parameters[place] = together_parameters(self.model, state.expected)

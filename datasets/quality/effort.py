@@ -69,7 +69,7 @@ def _deflection(episode: Demonstration, scale: Scale) -> FloatArray:
 
 @metric("", "lower")
 def undos(episode: Demonstration, scale: Scale) -> float:
-    """How often the operator went back to an earlier pause."""
+    """How often the operator went back to where they went on last."""
     return float(_of_person(episode, "undos").max())
 
 

@@ -89,7 +89,7 @@ def answer(name, sides, draws):
     ]
     beyond = abs(middle) + half > np.log(max(amounts) / min(amounts))
     bent = abs(differ) > bound * standard_error(differs, chance[3, 3])
-    limits = [", beyond the amounts driven"] * beyond + [", lines are not parallel"] * bent
+    limits = [", beyond the amounts driven"] * bool(beyond) + [", lines are not parallel"] * bool(bent)
     return f" {mean:.2f} ({low:.2f} to {high:.2f}){''.join(limits)}"
 
 
@@ -102,7 +102,7 @@ def highest(side, draws):
 def whole(sides):
     """Return draws in which both modes have every amount of data that any draw has, and how many are not."""
     data = [{each for draw in side.values() for each in draw} for side in sides]
-    begun = sorted({draw for side in sides for draw in side})
+    begun = sorted({draw for side in sides for draw in side}) if all(data) else []  # else a mode is not there
     kept = [d for d in begun if [side.get(d, {}).keys() for side in sides] == data]
     return kept, len(begun) - len(kept)
 

@@ -124,15 +124,20 @@ def test_a_pair_is_kept_as_it_begins_while_the_base_drives(mpc):
     assert driven.brakes == 0
 
 
-def test_a_pair_stays_as_one_of_its_hands_was_moved(mpc):
+@pytest.mark.parametrize(
+    ("moved", "channel", "speed", "way"),
+    [("left", "left.vy", 0.1, 0.08), ("joint.arm_left_2_joint", "joint.arm_left_2_joint", -0.3, 0.005)],
+)
+def test_a_pair_stays_as_its_hands_were_moved_beside_it(mpc, moved, channel, speed, way):
     driven, begun = Driven(mpc), together_parameters(MODEL, HOME)
     driven.steer(("pair",), [0.0] * 6, 0.5)
-    driven.steer(("pair", "left"), [0.0, 0.1, *[0.0] * 10], 1.5)
+    names = np.array(CHANNELS.names)[CHANNELS.mask("pair", moved)]
+    driven.steer(("pair", moved), np.where(names == channel, speed, 0.0), 3.0)
     before = together_parameters(MODEL, driven.state.q)
     driven.steer(("pair",), [0.0] * 6, 2.0)
     after = together_parameters(MODEL, driven.state.q)
-    assert np.linalg.norm(before[:3] - begun[:3]) > 0.08
-    assert np.linalg.norm(after[:3] - before[:3]) < 0.02
+    assert np.linalg.norm(before[:3] - begun[:3]) > way
+    assert np.linalg.norm(after[:3] - before[:3]) < 0.25 * way
 
 
 def test_the_plain_controller_keeps_a_pair(mpc):

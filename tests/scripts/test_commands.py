@@ -139,6 +139,19 @@ def test_a_replay_repeats_the_recording_exactly(recorded):
     assert "0.00e+00" in ran("--dataset.root", recorded, name="replay")
 
 
+def test_a_heading_that_begins_anew_is_no_deviation(recorded, monkeypatch):
+    honest = OpenDataset.frames
+
+    def leaps(*arguments):
+        frames = honest(*arguments)
+        state = frames["observation.state"].copy()
+        state[len(state) // 2 :, 2] -= np.float32(2.0 * np.pi)
+        return frames | {"observation.state": state}
+
+    monkeypatch.setattr(OpenDataset, "frames", leaps)
+    assert replay_episode(recorded, 0)[0].largest < 1e-5
+
+
 def test_a_replay_shows_when_the_commands_differ(recorded, monkeypatch):
     """The deviation is measured, not assumed."""
     honest = OpenDataset.frames

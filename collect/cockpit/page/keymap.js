@@ -88,7 +88,7 @@ export const STICKS = {
 
 // The joints' channels that digits reach at a time: those that move one hand alone, then the rest; as many as there are keys.
 export function digitGroups({ joints, base, hands }) {
-  const movedBy = (index) => hands.flatMap((hand, number) => (hand.joints.includes(index) ? [number] : []));
+  const movedBy = (index) => hands.length < 2 ? [0] : hands.flatMap((hand, number) => (hand.joints.includes(index) ? [number] : []));
   const arm = joints.flatMap((name, index) => (index < base ? [] : [{ channel: `joint.${name}`, by: movedBy(index) }]));
   const sets = [...hands.keys(), null].map((hand) => ({ hand, own: arm.filter(({ by }) => (by.length === 1 ? by[0] : null) === hand) }));
   return sets.flatMap(({ hand, own }) => own.flatMap((_, index) => (index % BELOW.length ? [] : [{ hand, channels: own.slice(index, index + BELOW.length).map(({ channel }) => channel) }])));

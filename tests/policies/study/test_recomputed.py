@@ -148,7 +148,8 @@ def archive(tmp_path, cells):
 
 
 def said_by(*script):
-    return subprocess.run([sys.executable, *script], capture_output=True, text=True, check=True).stdout
+    words = [sys.executable, "-W", "error", *script]
+    return subprocess.run(words, capture_output=True, text=True, check=True).stdout
 
 
 def test_a_mode_that_needs_twice_the_minutes_is_said_to(archive):
@@ -248,6 +249,10 @@ def test_a_contact_after_the_hand_got_nearer_no_more_is_told_apart(tmp_path):
         (
             ("minutes.py", RESULTS / "teleop_modes_answer.tar.xz", "ee", "direct"),
             "pick_place, ee: expected policies of several amounts of data, got one",
+        ),
+        (
+            ("minutes.py", RESULTS / "teleop_modes_answer.tar.xz", "ee", "typo"),
+            "pick_place: expected two whole draws or more of ee and typo, got 0",
         ),
         (("metrics.py", RESULTS / "takeover_takeover.json"), "expected three modes with all draws"),
         (("success.py", "figure.png", RESULTS / "takeover_takeover.tar.xz"), "expected undisturbed policies"),
