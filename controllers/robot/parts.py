@@ -64,7 +64,7 @@ class Limits:
     servo: Positives
 
     def check_inside(self, what: str, joints: tuple[str, ...], values: Iterable[float]) -> None:
-        """Check that the positions of the first joints are inside their limits."""
+        """Check that the first joints [m, rad] are inside their limits, or raise HandrailError."""
         ranges = zip(joints, self.position_lower, values, self.position_upper, strict=False)
         for name, lower, value, upper in ranges:
             if not lower <= value <= upper:
