@@ -2,7 +2,8 @@
 
 `python docs/results/success.py FIGURE.png ARCHIVE.tar.xz …`. A point is a mode with an amount of data in one
 study: the mean over draws, and 95 % by Student's t over these, whose variance is at least that of a draw's
-rollouts by chance; one draw has none. Amounts of the same recordings are joined. It also prints the points.
+rollouts by chance; one draw has none. Amounts of the same recordings are joined. Tasks are in the order of
+their least minutes, modes in that of their highest success. It also prints the points.
 """
 
 import json
@@ -17,7 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from scipy import stats
 
-MARKS = "osD^v"  # a study each
+MARKS = "osD^v"  # a study each, and a colour a mode
+COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b4b8a", "#7f7f7f"]
 
 
 def read(archive):
@@ -52,18 +54,27 @@ def main(figure, *archives):
     studies = [read(archive) for archive in archives]
     if not all(studies):
         sys.exit("expected undisturbed policies of realised motion, got none")
-    tasks, modes = (list(dict.fromkeys(key[k] for each in studies for key in each)) for k in (0, 1))
+    points = [
+        {key: sorted((*point(draws), len(draws)) for draws in kinds.values()) for key, kinds in study.items()}
+        for study in studies
+    ]
+    least, best = defaultdict(list), defaultdict(list)
+    for each in points:
+        for (task, mode), rows in each.items():
+            least[task].append(rows[0][0])
+            best[mode].append(-max(row[1] for row in rows))
+    tasks, modes = (sorted(found, key=lambda name: min(found[name])) for found in (least, best))
     drawn = Figure((5.2 * len(tasks), 4.2), layout="constrained")
     for axes, task in zip(np.atleast_1d(drawn.subplots(1, len(tasks), sharey=True)), tasks, strict=True):
-        for mark, study in zip(cycle(MARKS), studies, strict=False):
+        for mark, study in zip(cycle(MARKS), points, strict=False):
             for mode in (mode for mode in modes if (task, mode) in study):
-                points = sorted((*point(rows), len(rows)) for rows in study[task, mode].values())
-                x, y, low, high, _ = np.transpose(points)
+                x, y, low, high, _ = np.transpose(study[task, mode])
                 name = mode if mode not in axes.get_legend_handles_labels()[1] else None
-                style = {"color": f"C{modes.index(mode)}", "marker": mark, "ms": 5, "capsize": 2}
+                colour = COLOURS[modes.index(mode) % len(COLOURS)]
+                style = {"color": colour, "marker": mark, "ms": 5, "capsize": 2}
                 beside = x * np.exp(0.015 * (modes.index(mode) - len(modes) / 2))  # side by side
                 axes.errorbar(beside, y, (y - low, high - y), label=name, **style)
-                for minutes, share, *ends, count in points:
+                for minutes, share, *ends, count in study[task, mode]:
                     span = " to ".join(f"{end:.1f}" for end in ends)
                     sure = f"({span}), {count} draws" if count > 1 else "(one draw)"
                     print(f"{task}, {mode}: {minutes:.1f} min {share:.1f} % {sure}")
@@ -71,7 +82,7 @@ def main(figure, *archives):
             name = Path(archive).name.removesuffix(".tar.xz")
             axes.plot([], [], mark, color="0.5", ms=5, label=name)
         axes.set(title=task.replace("_", " "), xlabel="operator's time [min]", ylim=(-3, 103), xscale="log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0)))
         axes.xaxis.set_major_formatter("{x:g}")
         axes.minorticks_off()
         axes.spines[["top", "right"]].set_visible(False)

@@ -14,6 +14,7 @@ from places import ROOT
 RESULTS = ROOT / "docs" / "results"
 PRESETS = ROOT / "policies" / "study" / "presets"
 LINE = r"(.+): (\S+) \((\S+) to (\S+)\), 8 draws.*, p (\S+), after Holm (\S+)"
+TASKS = ("reach", "pick_place")
 DESIGNS = {"factors": RESULTS / "teleop_modes_factors.toml", "answer": PRESETS / "answer.toml"}
 
 
@@ -163,6 +164,16 @@ def test_a_mode_that_needs_twice_the_minutes_is_said_to(archive):
     assert told.count("; highest success quick 92 %, slow 72 %") == 2
     assert "parallel" not in told
     assert "beyond" not in told
+
+
+def test_the_page_says_the_minutes_of_the_archive():
+    modes = ("ee_mink", "ee_dls", "direct")
+    told = said_by(RESULTS / "minutes.py", RESULTS / "teleop_modes_amount.tar.xz", "ee", *modes)
+    page = (RESULTS / "teleop_modes.md").read_text()
+    for mode in modes:
+        found = {task: re.search(rf"{task}, minutes: {mode} / ee (.+?\))", told)[1] for task in TASKS}
+        (row,) = re.findall(rf"^\| `{mode}` \| .*", page, re.MULTILINE)
+        assert row.endswith(f" | {found['reach']} | {found['pick_place']} |")
 
 
 @pytest.mark.parametrize(
