@@ -16,7 +16,8 @@ class Limiter:
 
     With the previous command v⁻ and the target v, over a step of h seconds:
     `v⁺ = clip(clip(v, ±v_max), v⁻ ± h a_max)`. With a position given, the velocity towards a position
-    limit is also kept below what can brake before it, `sqrt(2 a_max distance)`.
+    limit at distance d is also so low that the robot can stop before it, while the velocity goes linearly
+    from v⁻ to v⁺: `h (v⁻ + v⁺) / 2 + v⁺² / (2 a_max) ≤ d`. Whole steps add h² a_max / 8 at most.
 
     Attributes:
         limits: of the robot.
@@ -46,7 +47,7 @@ class Limiter:
         maximum = self.limits.velocity
         allowed = _within(wanted, -maximum, maximum)
         if q is not None and known:
-            allowed = _within(allowed, *self._braking_range(q))
+            allowed = _within(allowed, *self._braking_range(previous, duration, q))
         step = self.limits.acceleration * duration
         allowed = _within(allowed, previous - step, previous + step)
         tolerance = _TOLERANCE * (maximum + step)
@@ -67,11 +68,14 @@ class Limiter:
         result[:count] = velocities
         return result[: count + needed]
 
-    def _braking_range(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        above = np.maximum(self.limits.position_upper - q, 0.0)
-        below = np.maximum(q - self.limits.position_lower, 0.0)
-        twice = 2.0 * self.limits.acceleration
-        return -np.sqrt(twice * below), np.sqrt(twice * above)
+    def _braking_range(
+        self, previous: FloatArray, duration: float, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        half, acceleration, travelled = 0.5 * duration, self.limits.acceleration, 0.5 * duration * previous
+        above = np.maximum(self.limits.position_upper - q - travelled, 0.0) / acceleration
+        below = np.maximum(q + travelled - self.limits.position_lower, 0.0) / acceleration
+        fastest = [acceleration * (np.sqrt(half**2 + 2.0 * room) - half) for room in (below, above)]
+        return -fastest[0], fastest[1]
 
 
 def _within(values: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
