@@ -112,7 +112,6 @@ typedef struct {
   int64_t changes;
   int64_t rows;
   int64_t steps;
-  double *phases;            /* (3,) time that distances, residuals and the QP took [s] */
   double work;               /* numbers that may be touched; what is left of them */
   double *nodes;             /* (K, n) at which distances are kept, */
   double *times;             /* (K,) */

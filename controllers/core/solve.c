@@ -1,5 +1,4 @@
 /* The plan of one update: Gauss-Newton steps around a guess, usually one. */
-#include <time.h>
 
 #include "core.h"
 #include "vector.h"
@@ -18,12 +17,6 @@ static double depth(const Core *c) {
     deepest = LARGER(deepest, now - c->found[i]);
   }
   return deepest;
-}
-
-static double clock_now(void) {
-  struct timespec now;
-  timespec_get(&now, TIME_UTC);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 /* Roll out accelerations; measure distances along them; take the rows of those that are near. The next path begins
@@ -131,27 +124,21 @@ static double shortfall(Core *c, Scene *scene) {
 
 /* Write the QP of a step from the guess: H, g and the rows; return the cost of the guess. */
 double build_program(Core *c, Scene *scene) {
-  double start = clock_now();
   for (int64_t p = 0; p < c->P; p++) c->within[p] = c->margins[p] + c->activation;
   begin(c, scene);
-  double measured = clock_now(), cost = expand(c, c->path, c->speeds, c->u);
-  c->phases[0] += measured - start;
-  c->phases[1] += clock_now() - measured;
-  return cost;
+  return expand(c, c->path, c->speeds, c->u);
 }
 
 
 /* Solve the problem that stands in the core. A step that did not lead where its linearisation said is followed by
    another; what is reached when the work is spent is the plan. */
 void solve_update(Core *c, Scene *scene) {
-  memset(c->phases, 0, 3 * sizeof(double));
   for (c->steps = 1;; c->steps++) {
-    double before = build_program(c, scene), start = clock_now();
+    double before = build_program(c, scene);
     if (c->steps == 1) memcpy(c->distances, c->found, c->P * sizeof(double));
     c->rows = c->count;
     c->solved = solve_program(c, scene);
     double after = c->solved ? damp(c, before) : 0.0;
-    c->phases[2] += clock_now() - start;
     if (!c->solved) return;
     if (c->work <= 0.0 || c->steps > MORE_STEPS || !is_coarse(before, after, c->descent)) break;
     memcpy(c->guess, c->u, c->M * sizeof(double));

@@ -60,7 +60,7 @@ class MaskedMpc:
         pair = (together(self.channels),) if lacks_pair else ()
         horizon = self.settings.horizon
         self.residuals = StageResiduals(model, (*built_in, *objectives, *pair), horizon)
-        self.solver = RealTimeSolver(self.residuals, horizon, model.size, self.settings.dt)
+        self.solver = RealTimeSolver(self.residuals, horizon, model.size)
         self._builder = ProblemBuilder(model, self.settings, self.residuals)
         self._validator = InputValidator(self.channels, self.settings.intent_timeout)
         self._supervisor = Supervisor(Limiter(model.description), self.settings, len(self.channels.hands))

@@ -73,8 +73,6 @@ class Plan(NamedTuple):
     thousandth of its size."""
     distances: FloatArray  # signed distances now, (P,)
     solved: bool  # whether the solver reports a solution
-    iterations: int  # of the solver
     rows: int = 0  # inequality rows of the last QP, bounds left out
     active: IntArray = np.empty(0, dtype=int)
     """Names of those that hold with equality, for the next problem among the same pairs."""
-    phases: tuple[tuple[str, float], ...] = ()  # where the time went: `residuals`, `distances`, `solve` [s]

@@ -7,7 +7,6 @@ program promises nothing more. Nothing in it is meant to be fast.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -67,13 +66,12 @@ class _Iterate:
 
 
 class _Solution(NamedTuple):
-    """A change of s, (N n,), what it promises to cost, whether IPOPT converged, and its iterations."""
+    """A change of s, (N n,), what it promises to cost, and whether IPOPT converged."""
 
     change: FloatArray
     u: FloatArray
     cost: float
     solved: bool
-    iterations: int
 
 
 class ConvergedSolver:
@@ -93,13 +91,11 @@ class ConvergedSolver:
 
     def solve(self, problem: Problem, guess: FloatArray) -> Plan:
         """Return the minimum near the accelerations `guess`, (N, n); `solved` says whether it is one."""
-        start = perf_counter()
         limit = problem.limits.acceleration
         here = self._iterate(problem, guess)
-        share, total, done = _LARGEST_TRUST, 0, False
+        share, done = _LARGEST_TRUST, False
         for _ in range(_ROUNDS):
-            solution, after, iterations = self._step(problem, here, share * limit)
-            total += iterations
+            solution, after = self._step(problem, here, share * limit)
             if not solution.solved:
                 break
             cost = here.exact.cost
@@ -120,9 +116,7 @@ class ConvergedSolver:
             limit_slack=float(here.exact.slack[LIMITS]),
             distances=frozen(problem.collision.values(problem.q[None])[0]),
             solved=done,
-            iterations=total,
             rows=len(here.near),
-            phases=(("solve", perf_counter() - start),),
         )
 
     def evaluate(self, problem: Problem, u: FloatArray) -> Evaluation:
@@ -166,15 +160,14 @@ class ConvergedSolver:
                     matrix[row, before * n : (before + 1) * n] = -share
             matrix[row, horizon * n + problem.collision.kinds[pair]] = -1.0
 
-    def _step(self, problem: Problem, here: _Iterate, trust: FloatArray) -> tuple[_Solution, _Iterate, int]:
-        """Return the program's solution, the best iterate found with it, and iterations.
+    def _step(self, problem: Problem, here: _Iterate, trust: FloatArray) -> tuple[_Solution, _Iterate]:
+        """Return the program's solution, and the best iterate found with it.
 
         Where the distances curve, the exact cost at the solution is much higher than promised: the rows are
         then made exact there, gradients kept, and the program is solved again (a second-order correction).
         """
         first = solution = self._solved(problem, here, here.left, trust)
         best = after = self._iterate(problem, first.u)
-        total = first.iterations
         for _ in range(_CORRECTIONS if len(here.near) else 0):
             cost = here.exact.cost
             if cost - best.exact.cost >= _ENOUGH * (cost - first.cost) or not solution.solved:
@@ -186,8 +179,7 @@ class ConvergedSolver:
             solution = self._solved(problem, here, left, trust)
             after = self._iterate(problem, solution.u)
             best = after if after.exact.cost < best.exact.cost else best
-            total += solution.iterations
-        return first, best, total
+        return first, best
 
     def _solved(self, problem: Problem, here: _Iterate, left: FloatArray, trust: FloatArray) -> _Solution:
         """Return the minimum within a trust region, (n,), where so much is left of the distances, (R,)."""
@@ -225,7 +217,7 @@ class ConvergedSolver:
             raise KeyboardInterrupt
         change, stats = np.array(found["x"]).ravel()[: u.size], solver.stats()
         moved = np.array(found["g"]).ravel()[2 * len(upper) :][: u.size].reshape(u.shape)
-        return _Solution(change, moved, float(found["f"]), bool(stats["success"]), int(stats["iter_count"]))
+        return _Solution(change, moved, float(found["f"]), bool(stats["success"]))
 
 
 def _program(residuals: Any, shape: tuple[int, int], matrix: FloatArray, rows: int) -> ca.Function:

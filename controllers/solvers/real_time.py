@@ -14,7 +14,6 @@ from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 
 NOTHING_ACTIVE = np.arange(SLACKS)  # only the slacks are at rest: none is negative
-_PHASES = ("distances", "residuals", "solve")
 WORK = 2e5  # of all QPs of an update for each variable, counted as core/active_set.c does
 _ROUNDING = 2e-5  # of a joint's range, that the QP leaves
 
@@ -26,11 +25,10 @@ class RealTimeSolver:
         residuals: of all stages.
         horizon: stages N.
         size: coordinates n.
-        dt: length of a stage [s].
     """
 
-    def __init__(self, residuals: StageResiduals, horizon: int, size: int, dt: float) -> None:
-        self._residuals, self._shape, self._dt = residuals, (horizon, size), dt
+    def __init__(self, residuals: StageResiduals, horizon: int, size: int) -> None:
+        self._residuals, self._shape = residuals, (horizon, size)
         self._collision: CollisionModel | None = None
         self._weights: FloatArray | None = None
         self._core: Memory | None = None
@@ -62,10 +60,8 @@ class RealTimeSolver:
             limit_slack=max(slacks[LIMITS], excess),  # the plan may not keep all rows where the work ended
             distances=frozen(core.distances),
             solved=bool(core.fields.solved),
-            iterations=core.fields.changes,
             rows=core.fields.rows,
             active=core.active[: core.fields.active_rows].copy(),
-            phases=tuple(zip(_PHASES, core.phases.tolist(), strict=True)),
         )
 
     def program(self, problem: Problem, guess: FloatArray) -> Memory:

@@ -14,7 +14,7 @@ from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
 from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.reading.load import each_demonstration
+from handrail.datasets.reading.load import each_opened, recorded_episodes
 
 CHATTERING = ("rate of change", "high-frequency content", "corrections")  # a table of its own
 ASKED, OWNED = "teleop.values", "teleop.mask"
@@ -60,7 +60,7 @@ class EpisodeSummary:
 
 def summarize(root: str | Path) -> list[EpisodeSummary]:
     """Return one summary an episode of any LeRobot v3.0 dataset, in order."""
-    return [_summary(episode) for episode in each_demonstration(root)]
+    return [_summary(episode) for episode in each_opened(recorded_episodes(root))]
 
 
 def _summary(episode: Demonstration) -> EpisodeSummary:

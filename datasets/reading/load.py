@@ -59,12 +59,7 @@ def each_opened(episodes: Iterable[Episode]) -> Iterator[Demonstration]:
 
 def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) -> list[Demonstration]:
     """Return the episodes that `recorded_episodes` returns with their rows, all in memory."""
-    return list(each_demonstration(root, columns))
-
-
-def each_demonstration(root: str | Path, columns: ColumnNames | None = None) -> Iterator[Demonstration]:
-    """Yield the episodes that `read_demonstrations` returns, one in memory at a time."""
-    return each_opened(recorded_episodes(root, columns))
+    return list(each_opened(recorded_episodes(root, columns)))
 
 
 def _wanted(info: DatasetInfo, columns: ColumnNames) -> tuple[str, ...]:

@@ -69,7 +69,7 @@ class Peer:
 def _ipopt(loop: TimingLoop) -> Take:
     """Return the converged solver, IPOPT, from the same guess."""
     settings = loop.mpc.settings
-    solver = ConvergedSolver(loop.mpc.residuals, settings.horizon, loop.model.size, settings.dt)
+    solver = ConvergedSolver(loop.mpc.residuals, settings.horizon, loop.model.size)
 
     def take(update: Update) -> Solve:
         def solve() -> FloatArray | None:
@@ -161,7 +161,7 @@ def _geometry(loop: TimingLoop, update: Update) -> pin.GeometryModel:
 def _programs(loop: TimingLoop) -> Callable[[Update], Memory]:
     """Return what puts the QP of an update into a core of its own."""
     settings = loop.mpc.settings
-    solver = RealTimeSolver(loop.mpc.residuals, settings.horizon, loop.model.size, settings.dt)
+    solver = RealTimeSolver(loop.mpc.residuals, settings.horizon, loop.model.size)
     return lambda update: solver.program(update.problem, update.guess)
 
 

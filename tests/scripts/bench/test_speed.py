@@ -56,7 +56,7 @@ def test_a_case_has_the_degrees_and_about_the_pairs_that_it_says(degrees):
 def test_every_qp_solver_finds_the_same_minimum_within_the_same_rows(case):
     pytest.importorskip("piqp")
     loop = TimingLoop(case, 1)
-    solver = RealTimeSolver(loop.mpc.residuals, case.horizon, loop.model.size, loop.mpc.settings.dt)
+    solver = RealTimeSolver(loop.mpc.residuals, case.horizon, loop.model.size)
     takes = {name: PEERS[name](loop) for name in ("own_qp", "daqp", "piqp")}
     for update in loop.run(8):
         qp = dense(solver.program(update.problem, update.guess), update.problem.collision.memory)
