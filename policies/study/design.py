@@ -14,10 +14,12 @@ curve = [5000, 10000]           optional: what policies have learnt after fewer 
 
 [tasks.reach]
 minutes = 10.0                  of the operator's time in each mode, failed attempts included
-episodes = 50                   successful demonstrations in each mode, at least
+episodes = 50                   successful demonstrations in each mode, at least; with [rounds] those that fit
+                                into the minutes
 steps = 4000                    updates of each policy
 batch_size = 0                  samples an update; 0 for the preset's
-rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
+rollout_limit = 20.0            after which a policy's rollout has failed [s]; that of the demonstrations
+                                without it
 time_limit = 60.0               of a demonstration [s]; the task's own without it
 sizes = [3.0, 5.0]              optional, exploratory: more policies, of only so many of the minutes
 round_minutes = 0.0             with [rounds]: of the operator's time in each way in each round

@@ -16,6 +16,7 @@ from handrail.controllers.errors import HandrailError, check_known, restated, un
 from handrail.controllers.robot.description import load_description
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import decoded
+from handrail.datasets.format.layout import Layout
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import as_json
@@ -109,7 +110,7 @@ def recording(
             num_episodes=BATCH - so_far % BATCH,
             fps=FPS,
         ),
-        resume=root.exists(),
+        resume=Layout(root).manifest.is_file(),
         workers=1,  # a job has one core
         **beside,
     )
@@ -149,9 +150,9 @@ def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> d
         "time_limit": design.tasks[policy.cell.task].rollout_limit,
         "workers": 1,  # a job has one core
     }
-    found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
+    found, at = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}, Path(folder)
     for updates in design.curve if policy == StudyPolicy(policy.cell) else ():
-        place = Path(folder).parent.parent / f"{updates:06d}" / Path(folder).name
+        place = at.parent.parent / str(updates).zfill(len(at.parent.name)) / at.name
         here = {"policy": (str(place),), "label": f"{policy.label} {after(updates)}"}
         found[f"after-{updates}"] = EvaluateConfig(episodes=design.rollouts, **common | here)
     if job.robust and more:

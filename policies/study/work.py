@@ -14,6 +14,7 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.editing.merge import drop_episodes, merge_datasets
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
@@ -93,8 +94,9 @@ def _processor_time() -> float:
 def begin(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
     """Remove what a job made with other settings before, then note with which it begins.
 
-    A dataset may grow, but never mix two ways to record; rollouts of other conditions go, and those of a
-    policy that is gone; a policy that learnt otherwise goes with all its rollouts.
+    A dataset may grow, but never mix two ways to record, and goes where less is wanted; rollouts of other
+    conditions go, and those of a policy that is gone; a policy that learnt otherwise goes with all its
+    rollouts. What is noted of a job that was done with other settings goes, too.
     """
     settings, before = fingerprint(job, design), known_json(layout.begun(job))
     stale = [path for path in _stale(job, settings, before, layout) if path.exists()]
@@ -106,6 +108,8 @@ def begin(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
     for path in stale:
         Terminal().print(f"removed, made with other settings: {path}")
         remove(path)
+    if known_json(layout.done(job)).get("settings") != settings:
+        remove(layout.done(job))
     write_json(layout.begun(job), settings)
 
 
@@ -114,7 +118,8 @@ def _stale(
 ) -> list[Path]:
     """Return where something would be that does not go with the settings of now."""
     if job.policy is None:
-        return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
+        less = any(now["wanted"][what] < count for what, count in before.get("wanted", {}).items())
+        return [layout.dataset(job.cell)] if less or now["recording"] != before.get("recording") else []
     policy, driven = job.policy, before.get("evaluations", {})
     known = now["evaluations"] | driven
     if any(now[part] != before.get(part) for part in ("recording", "wanted", "training")):
@@ -152,7 +157,7 @@ def collect(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
     if way_of(cell, design).arbiter:
         from handrail.policies.imitation.evaluation.copilot import share as copilot
     while True:
-        rows = read_episodes(root) if root.exists() else []
+        rows = read_episodes(root) if Layout(root).info.is_file() else []
         whole = rows[: len(rows) // BATCH * BATCH]  # in a turn that was interrupted nobody looks
         successes = sum(bool(row["success"]) for row in whole)
         minutes = sum(row["length"] for row in whole) / FPS / 60.0

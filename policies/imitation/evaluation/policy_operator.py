@@ -103,7 +103,7 @@ class PolicyOperator:
     def _before(self, time: float) -> SceneMemory:
         """Return a memory of what was seen; after an undo, of what was seen before a time [s]."""
         known = self._memories
-        if time < known[-1][0]:
+        if time <= known[-1][0]:
             del known[bisect_left(known, time, key=itemgetter(0)) :]
         return known[-1][1].copy()
 

@@ -124,6 +124,19 @@ def test_after_an_undo_what_was_seen_since_is_forgotten():
     np.testing.assert_array_equal(*found)
 
 
+def test_the_pictures_of_a_moment_count_once():
+    """Asked again at the same time, as after a hand-back, a policy sees the same again."""
+    policy, seen = Plans(), []
+    policy.encoder = Looks()
+    operator = shared(policy)
+    policy.act = lambda state, around, *rest: seen.append(around) or ROWS[0]
+    for time, x in [(0.05, 1.0), (0.1, 1.2), (0.1, 1.2)]:
+        policy.encoder.x = x
+        operator.act(view(time))
+        operator._policy.replan()
+    np.testing.assert_array_equal(*seen[-2:])
+
+
 def test_what_any_hand_reaches_may_move():
     """Law: a cube that a hand carries is where it is seen now, whichever of two that is."""
     places = []

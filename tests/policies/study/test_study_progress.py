@@ -8,16 +8,17 @@ from pathlib import Path
 import pytest
 from study_helpers import COLLECTED, DESIGN, Starter, changed, everything, run_here
 
+from handrail.collect.commands import record as record_module
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.storage.strict_json import known_json, write_json
 from handrail.policies.imitation.training import presets
 from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import DeclaredPair
-from handrail.policies.study.jobs import StudyCell, jobs
+from handrail.policies.study.jobs import StudyCell, StudyLayout, jobs
 from handrail.policies.study.progress import StudyProgress
 from handrail.policies.study.settings import evaluations, fingerprint, load_design, recording, training
-from handrail.policies.study.work import begin, do, work
+from handrail.policies.study.work import begin, collect, do, work
 
 
 @pytest.mark.parametrize(
@@ -25,10 +26,11 @@ from handrail.policies.study.work import begin, do, work
     [
         (lambda design: design, set()),
         (lambda design: dataclasses.replace(design, draws=1), set()),
-        (lambda design: changed(design, episodes=4), {"policy", "nominal", "disturbed", "protected"}),
+        (lambda design: changed(design, episodes=6), {"policy", "nominal", "disturbed", "protected"}),
         (lambda design: changed(design, steps=11), {"policy", "nominal", "disturbed", "protected"}),
         (lambda design: changed(design, rollout_limit=9.0), {"nominal", "disturbed", "protected"}),
         (lambda design: dataclasses.replace(design, rollouts=41), {"nominal"}),
+        (lambda design: changed(design, minutes=0.05), "all"),
         (lambda design: dataclasses.replace(design, persons=1), "all"),
         (lambda design: dataclasses.replace(design, seed=7), "all"),
     ],
@@ -44,6 +46,42 @@ def test_results_of_other_settings_are_removed_and_nothing_else(change, goes, tm
     assert {name for name, path in made.items() if not path.exists()} == (
         set(made) if goes == "all" else goes
     )
+
+
+def test_a_job_begun_with_other_settings_is_done_with_none(tmp_path, preset):
+    """Law: a study that goes on as it was before never takes what was made in between for its own."""
+    design, layout, found = everything(tmp_path, preset)
+    other = changed(dataclasses.replace(design, persons=1), steps=11)
+    begun = found[0], next(job for job in found if job.policy)
+    for job in begun:
+        begin(job, other, layout)
+    assert StudyProgress(design, layout).missing == [job.name for job in begun]
+    for job in found:
+        begin(job, design, layout)  # and the note of what is done with just these stays
+    assert StudyProgress(design, layout).missing == [job.name for job in begun]
+
+
+def test_checkpoints_have_as_many_digits_as_lerobot_gives_them(preset):
+    design = dataclasses.replace(load_design(preset), curve=(500000,))
+    (job, *_) = (job for job in jobs(design) if job.policy)
+    asked = evaluations(job, design, "run/checkpoints/1000000/model")
+    assert asked["after-500000"].policy == ("run/checkpoints/0500000/model",)
+
+
+@pytest.mark.parametrize("left", [[], [".handrail/lock"], ["meta/handrail.json"]])
+def test_a_dataset_that_was_hardly_begun_is_recorded(left, tmp_path, preset, monkeypatch):
+    """After a power cut there may be a folder without a dataset."""
+    design, layout = load_design(preset), StudyLayout(tmp_path / "study")
+    (job, *_) = jobs(design)
+    root, turns = layout.dataset(job.cell), []
+    root.mkdir(parents=True)
+    for name in left:
+        (root / name).parent.mkdir()
+        (root / name).touch()
+    monkeypatch.setattr(record_module, "record", lambda config, share: turns.append(config.resume) or 1)
+    with pytest.raises(HandrailError, match="exit code 1"):
+        collect(job, design, layout)
+    assert turns == [left == ["meta/handrail.json"]]
 
 
 def test_rollouts_of_a_policy_that_is_gone_go_too(tmp_path, preset):
