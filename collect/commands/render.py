@@ -96,7 +96,7 @@ def _which(
     rows: Sequence[Mapping[str, Any]], config: RenderConfig, randomise: bool = False
 ) -> list[tuple[Any, ...]]:
     """Return what tells episodes from others, also from those of the same seeds or with other looks."""
-    names = ("seed", "started", "length")
+    names = ("seed", "started", "length", "success", "failure_reason", "tasks")
     looks = [randomise or recorded_settings(row, config.said).randomise for row in rows]
     return [(*map(row.get, names), look) for row, look in zip(rows, looks, strict=True)]
 

@@ -19,6 +19,7 @@ from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.metadata import ColumnTypes
 from handrail.datasets.format.video import GROUP
 from handrail.datasets.quality.motion import FLOOR
+from handrail.datasets.reading import naming
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import read_rows_of
 from handrail.datasets.recording.rewrite import drafted
@@ -92,14 +93,16 @@ def moving_stretch(episode: Demonstration, margin: float) -> tuple[int, int]:
     """Return the first frame and the number of frames between what is idle at both ends.
 
     A frame is idle while |q(t) − q(end)| ≤ max(0.005, 1 % of the range) for every entry of the
-    configuration q, where the end is that of its side. The first frame with success is never cut off. Where
-    there are cameras, the first frame begins a group of pictures, so that videos need not be encoded anew.
+    configuration q and every gripper, where the end is that of its side. The first frame with success is
+    never cut off. Where there are cameras, the first frame begins a group of pictures, so that videos need
+    not be encoded anew.
 
     Args:
         episode: Which; its configuration in the units of its state.
         margin: Time to leave on both sides [s].
     """
-    positions, count = episode.configuration, episode.count
+    grippers = naming.gripper_entries(episode.entries("state"))
+    positions, count = np.hstack([episode.configuration, episode.matrix("state")[:, grippers]]), episode.count
     still = np.maximum(FLOOR, _SHARE * np.ptp(positions, axis=0))
     moved, away = (np.flatnonzero((abs(positions - positions[end]) > still).any(axis=1)) for end in (0, -1))
     if not moved.size or not away.size:

@@ -186,7 +186,7 @@ def _check_nobody(root: Path) -> None:
                 f" are never sent; {advice}"
             )
         known = _DEVICE in dataset.info.features
-        suspects = [row["episode_index"] for row in rows if known and _PARTICIPANT not in row]
+        suspects = [row["episode_index"] for row in rows if known and row.get(_PARTICIPANT) is None]
         unknown = [each for each in suspects if any(dataset.frames(each, [_DEVICE])[_DEVICE] != "")]
     if unknown:
         raise HandrailError(

@@ -1,9 +1,9 @@
 """How much work steering was: what the operator put in, by axis, and what only a person's device records.
 
-Inputs of different kinds are made comparable by their scale, the largest value of each axis in all datasets
-that are compared: 1 is full deflection; an axis that was never used does not count. Measures: Herlant et al.
-2016, "Assistive teleoperation of robot arms via automatic time-optimal mode switching", for mode switches;
-the others are common in teleoperation.
+The input is the velocity that the operator asked for on each axis. Its scale is the largest value of each
+axis in all datasets that are compared: 1 is full deflection; an axis that was never used does not count.
+Measures: Herlant et al. 2016, "Assistive teleoperation of robot arms via automatic time-optimal mode
+switching", for mode switches; the others are common in teleoperation.
 """
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.scale import Scale
+from handrail.datasets.reading import naming
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 _LATE = 95.0  # percentile
@@ -39,11 +40,15 @@ def input_reversals(episode: Demonstration, scale: Scale) -> float:
 
 @metric("", "lower")
 def mode_switches(episode: Demonstration, scale: Scale) -> float:
-    """How often the mode, or the set of axes that the operator owned, changed."""
+    """How often the mode, or the set of axes that the operator owned, changed; pauses are passed over."""
     parts = [episode.column(part) for part in ("mode", "owned") if episode.has(part)]
     if not parts:
         raise DoesNotApply("no column of the mode or of the axes that the operator owned")
-    rows = [part.reshape(len(part), -1) for part in parts]
+    steers = slice(None)
+    if episode.has("owned"):
+        grippers = naming.gripper_entries(episode.entries("owned"))
+        steers = np.delete(episode.matrix("owned"), grippers, axis=1).any(axis=1)
+    rows = [part.reshape(len(part), -1)[steers] for part in parts]
     changed = [(each[1:] != each[:-1]).any(axis=1) for each in rows]
     return float(np.count_nonzero(np.any(changed, axis=0)))
 

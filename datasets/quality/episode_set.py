@@ -10,6 +10,7 @@ from handrail.datasets.quality.scale import Scale, embed
 from handrail.datasets.reading.demonstration import Demonstration, Episode
 from handrail.datasets.reading.load import each_opened
 
+_GOLDEN = 0.618  # multiples of it are evenly spread, modulo 1
 _SOME = 200  # episodes that stand for all of them where sizes are told apart
 
 
@@ -59,6 +60,8 @@ class EpisodeSet:
 def frames_of(lengths: Sequence[int], most: int) -> list[IntArray]:
     """Return which frames stand for each episode: evenly spaced, as many of all that are long enough.
 
+    Few frames begin at another part of each episode, so that together they are of all parts alike.
+
     Args:
         lengths: Of the episodes of one group [frames].
         most: Frames of all episodes together; all of them where there are fewer.
@@ -69,5 +72,7 @@ def frames_of(lengths: Sequence[int], most: int) -> list[IntArray]:
     for done, place in enumerate(order):  # the shorter ones whole, the rest alike, ±1
         shares[place] = min(int(whole[place]), left // (len(order) - done))
         left -= int(shares[place])
-    pairs = zip(whole, shares, strict=True)
-    return [np.linspace(0, length - 1, share).round().astype(int) for length, share in pairs]
+    return [
+        ((np.arange(share) + _GOLDEN * place % 1.0) * length / max(share, 1)).astype(int)
+        for place, (length, share) in enumerate(zip(whole, shares, strict=True))
+    ]

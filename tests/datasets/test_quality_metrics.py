@@ -232,8 +232,8 @@ def test_readings_of_devices_are_recorded_of_people_alone():
 
 
 def test_mode_switches():
-    mode = np.array(["base", "base", "ee", "ee", "base", "base"])
-    owned = np.array([[1, 0], [1, 0], [0, 1], [1, 1], [1, 0], [1, 0]], bool)
+    mode = np.array(["base", "base", "base", "ee", "ee", "base", "base"])
+    owned = np.array([[1, 0], [0, 0], [1, 0], [0, 1], [1, 1], [1, 0], [1, 0]], bool)  # a pause is none
     assert value(effort.mode_switches, mode=mode) == 2.0
     assert value(effort.mode_switches, owned=owned) == 3.0
     assert value(effort.mode_switches, mode=mode, owned=owned) == 3.0

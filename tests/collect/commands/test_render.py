@@ -217,6 +217,8 @@ def test_an_output_that_is_something_else_is_refused(tmp_path):
     other = tmp_path / "other"
     record(other, *LOOK, "--seed", "4", episodes=1)
     refuses(other, f"expected episodes of {recorded()}, found others")
+    ran(blind, "--episodes", "0", "--label", "success", "--in_place", name="edit relabel")
+    refused(blind, "--output", seen(), *LOOK, name="edit render", told=f"expected episodes of {blind}")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("mine")
     refuses(tmp_path / "mine", "expected a missing or empty folder")

@@ -92,7 +92,7 @@ def test_as_many_frames_stand_for_every_group(monkeypatch):
 
 @pytest.mark.parametrize("most", [1, 7, 100, 101, 10_000])
 def test_frames_of_episodes(most):
-    """Exactly as many as asked for if there are; each at most once; the ends of every episode among them."""
+    """Exactly as many as asked for if there are; each at most once; evenly spaced."""
     lengths = [each.count for each in group("a", 5, rng(5)).episodes]
     chosen = frames_of(lengths, most)
     assert sum(map(len, chosen)) == min(most, sum(lengths))
@@ -101,8 +101,15 @@ def test_frames_of_episodes(most):
         assert len(set(frames)) == len(frames)
         assert set(frames) <= set(range(length))
         if len(frames) > 1:
-            assert (frames[0], frames[-1]) == (0, length - 1)
             assert np.ptp(np.diff(frames)) <= 1
+
+
+@pytest.mark.parametrize("count", [100, 1000, 1500, 3000])
+def test_frames_of_many_episodes_are_of_all_their_parts_alike(count):
+    """Also where an episode has but one or two: what is measured does not become what they begin with."""
+    chosen = np.concatenate(frames_of([80] * count, 2048))
+    parts = np.bincount(chosen // 10, minlength=8) / len(chosen)
+    np.testing.assert_allclose(parts, 1 / 8, atol=0.01)
 
 
 def test_the_success_that_is_shown_is_the_one_that_is_tested():

@@ -146,9 +146,18 @@ def test_participants_are_not_sent(tmp_path, hub):
     assert (hub.sent, hub.repo) == ({}, {})
 
 
-def test_episodes_of_unknown_drivers_are_not_sent(tmp_path, hub):
-    """LeRobot's `delete_episodes` drops the column that says whose an episode is."""
+@pytest.mark.parametrize("merged", [False, True])
+def test_episodes_of_unknown_drivers_are_not_sent(tmp_path, hub, merged):
+    """LeRobot's `delete_episodes` drops the column that says whose an episode is; its merge leaves it empty."""
+    from lerobot.datasets.dataset_tools import merge_datasets
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
     root = record_episodes(tmp_path / "set", 2, driven=True)
+    if merged:
+        mine = record_episodes(tmp_path / "mine", 1, participant="")
+        parts = [LeRobotDataset("me/part", root=each) for each in (root, mine)]
+        root = tmp_path / "both"
+        merge_datasets(parts, output_repo_id="me/both", output_dir=root)
     said = push(root, "--upload", code=2).stderr
     assert "people drove episodes 0-1, and another tool has dropped who" in said
     assert not hub.sent
