@@ -53,11 +53,6 @@ class Pipe:
         self._waiting = deque[tuple[Kind, bytes]]()
         self._parts: list[bytes] = []  # of a message that comes in
 
-    @staticmethod
-    def pair() -> tuple[socket.socket, socket.socket]:
-        """Return two connected ends."""
-        return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-
     def fileno(self) -> int:
         """Return the file descriptor, for a loop that waits."""
         return self._socket.fileno()

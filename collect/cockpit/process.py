@@ -4,6 +4,7 @@ import json
 import os
 import secrets
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -89,7 +90,7 @@ class ServerProcess:
         self._folder.cleanup()
 
     def _start(self) -> None:
-        ours, theirs = Pipe.pair()
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "handrail.collect.cockpit.server", str(theirs.fileno())],

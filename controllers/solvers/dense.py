@@ -19,14 +19,6 @@ class DenseProgram:
     upper: FloatArray  # b, (r,)
     rows: IntArray  # their numbers, (r,)
 
-    def value(self, x: FloatArray) -> float:
-        """Return the objective, (m,)."""
-        return float(0.5 * x @ self.hessian @ x + self.gradient @ x)
-
-    def violation(self, x: FloatArray) -> float:
-        """Return by how much the row that is broken most is."""
-        return float(np.max(self.matrix @ x - self.upper))
-
 
 def dense(core: Memory, scene: Memory) -> DenseProgram:
     """Return the QP that stands in the core, its H not yet factored, as dense matrices."""

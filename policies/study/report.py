@@ -29,6 +29,10 @@ _LIMITS = (
     "Measured with scripted operators, one simulated robot and one learner: it says nothing of people or"
     " of other learners."
 )
+_EXPLORES = (
+    " Contrasts are taken within each draw; several tasks count alike. Only declared contrasts are tested,"
+    " p after Holm over these; all others explore, and no interval is adjusted."
+)
 _HOW = (
     "A draw is a fresh recording (other scenes, other scripted persons), one training seed and beginnings"
     " of its own; it is the same for all modes, so draws are pairs. Every mode got the same operator time,"
@@ -36,9 +40,8 @@ _HOW = (
     " Every policy got the same updates. Policies write joint velocities, which go to the robot"
     " unprotected; an “intent” is the operator's command, which the MPC completes when"
     " the policy drives, too. Intervals are 95 %: Student's t over draws, where a draw varies at least as its"
-    " rollouts do; with one draw Wilson's, of these very policies. Contrasts are taken within each draw;"
-    " several tasks count alike. Only declared contrasts are tested, p after Holm over these; all others"
-    " explore, and no interval is adjusted. A system claim compares a policy and a controller with the best"
+    " rollouts do; with one draw Wilson's, of these very policies."
+    f"{_EXPLORES} A system claim compares a policy and a controller with the best"
     " of the unprotected policies in this very measure, chosen afterwards, which favours that policy."
 )
 _HOW_ROUNDS = (
@@ -47,9 +50,8 @@ _HOW_ROUNDS = (
     " policy. Then every way gets the same operator time, attention included: the length of whole attempts,"
     " failed ones too. After each round a policy learns from nothing, from all successful episodes of its way"
     " so far, in the same number of updates, and is measured alone: it writes the operator's intent, which"
-    " the MPC completes. Intervals are 95 %: Student's t over draws; with one draw Wilson's. Contrasts are"
-    " taken within each draw; several tasks count alike. Only declared contrasts are tested, p after Holm"
-    " over these; all others explore, and no interval is adjusted."
+    " the MPC completes. Intervals are 95 %: Student's t over draws; with one draw Wilson's."
+    f"{_EXPLORES}"
 )
 _FORMAT = "handrail.study/5"
 

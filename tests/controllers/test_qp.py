@@ -5,6 +5,7 @@ from typing import Any
 import daqp
 import numpy as np
 import pytest
+from plans import cost, violation
 
 from handrail.controllers.collision.slacks import LIMITS, SLACKS
 from handrail.controllers.core.library import Memory, functions
@@ -113,9 +114,9 @@ def test_the_solution_is_that_of_a_dense_solver(horizon, tight):
         x, same = program.solve(), program.dense
         core, expected = program.core, reference(same)
         assert core.fields.changes > 0
-        assert same.violation(x) <= 2e-5
+        assert violation(same, x) <= 2e-5
         assert np.all(core.multipliers[: core.fields.active_rows] > -1e-6)
-        np.testing.assert_allclose(same.value(x), same.value(expected), rtol=1e-6)
+        np.testing.assert_allclose(cost(same, x), cost(same, expected), rtol=1e-6)
         np.testing.assert_allclose(core.motion, program.motion(x[:-SLACKS]), atol=1e-9)
         quadratic = 0.5 * x[:-SLACKS] @ same.hessian[:-SLACKS, :-SLACKS] @ x[:-SLACKS]
         np.testing.assert_allclose(
@@ -137,9 +138,9 @@ def test_work_is_counted_and_where_it_ends_the_rows_met_so_far_hold():
         """Return how many changes it took, the work left, and the cost."""
         x = program.solve(work=work)
         assert x is not None
-        return fields.changes, fields.work, program.dense.value(x)
+        return fields.changes, fields.work, cost(program.dense, x)
 
-    changes, left, cost = solved(1e9)
+    changes, left, value = solved(1e9)
     spent = 1e9 - left
     assert solved(1e9)[1] == left  # no clock
     assert solved(1.01 * spent)[0] == changes
@@ -147,7 +148,7 @@ def test_work_is_counted_and_where_it_ends_the_rows_met_so_far_hold():
         fewer, rest, lower = solved(share * spent)
         assert rest <= 0.0
         assert fewer < changes
-        assert lower < cost  # fewer rows hold it back: the cost falls farther
+        assert lower < value  # fewer rows hold it back: the value falls farther
 
 
 def test_a_hessian_that_is_not_positive_is_no_solution():

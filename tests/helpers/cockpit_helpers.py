@@ -1,6 +1,7 @@
 """A server of the cockpit without a robot, and pages that are nothing but sockets."""
 
 import json
+import socket
 import ssl
 import time
 import urllib.error
@@ -11,12 +12,17 @@ from urllib.parse import urlsplit
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from handrail.collect.cockpit.pipe import Kind
+from handrail.collect.cockpit.pipe import Kind, Pipe
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.cockpit_config import CockpitConfig
 
 TRUSTING = ssl.create_default_context()
 TRUSTING.check_hostname, TRUSTING.verify_mode = False, ssl.CERT_NONE  # the certificate was made a moment ago
+
+
+def connected():
+    """Return the two ends of a connection."""
+    return [Pipe(end) for end in socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)]
 
 
 @contextmanager

@@ -6,12 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
-from cockpit_helpers import ask_for, drive
+from cockpit_helpers import ask_for, connected, drive
 
 from handrail.collect.cockpit import page_socket
 from handrail.collect.cockpit.hub import MOST_PAGES, Hub
 from handrail.collect.cockpit.page_socket import REPLACED
-from handrail.collect.cockpit.pipe import Kind, Pipe
+from handrail.collect.cockpit.pipe import Kind
 
 NAME = "page-number-one"
 TURNS = 30  # of the loop, for all to come to rest
@@ -50,7 +50,7 @@ class House:
     """A hub with its pages, and what reaches the recording."""
 
     def __init__(self):
-        self._recording, web = ends = [Pipe(end) for end in Pipe.pair()]
+        self._recording, web = ends = connected()
         self._recording.send(Kind.STAGE, {})
         self._ends, self._tasks, self.hub = ends, [], Hub(web)
         self.hub.hear()

@@ -10,10 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 import msgspec
 import numpy as np
 import pytest
-from cockpit_helpers import ask_for, drive, page, seen, server, show, stage, told
+from cockpit_helpers import ask_for, connected, drive, page, seen, server, show, stage, told
 
 from handrail.collect.cockpit.hub import Hub
-from handrail.collect.cockpit.pipe import Kind, Pipe
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import STILLS, Ask, Input
@@ -49,7 +49,7 @@ class QueuedSocket:
 
 @pytest.fixture
 def ends():
-    both = [Pipe(end) for end in Pipe.pair()]
+    both = connected()
     yield both
     for each in both:
         each.close()

@@ -276,7 +276,9 @@ def test_an_episode_that_hardly_moves_is_not_trimmed(lasting):
 def test_a_gripper_that_moves_is_not_idle():
     """The base moves in frames 50 to 100; the gripper closes before, and opens after it."""
     steps = np.arange(200)
-    state = np.column_stack([np.clip(steps - 50, 0, 50) / 50, np.clip(steps - 5, 0, 25) - (steps > 150) * 25.0])
+    state = np.column_stack(
+        [np.clip(steps - 50, 0, 50) / 50, np.clip(steps - 5, 0, 25) - (steps > 150) * 25.0]
+    )
     names, info = ("base.pos", "gripper.opening"), SimpleNamespace(features={}, fps=20)
     episode = SimpleNamespace(configuration=state[:, :1], count=200, fps=20, frames={}, info=info)
     episode.entries, episode.matrix = lambda part: names, lambda part: state

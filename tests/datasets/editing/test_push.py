@@ -148,7 +148,7 @@ def test_participants_are_not_sent(tmp_path, hub):
 
 @pytest.mark.parametrize("merged", [False, True])
 def test_episodes_of_unknown_drivers_are_not_sent(tmp_path, hub, merged):
-    """LeRobot's `delete_episodes` drops the column that says whose an episode is; its merge leaves it empty."""
+    """LeRobot's `delete_episodes` drops the column of participants; its merge leaves it empty."""
     from lerobot.datasets.dataset_tools import merge_datasets
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
