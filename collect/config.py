@@ -222,8 +222,8 @@ class RecordConfig(SessionConfig, PolicyConfig, ExecutionConfig):
             raise HandrailError(f"--robot_client {self.robot_client}: {words}")
         self.check_policy(self.operator)
         real = self.robot_client and not self.client.simulated
-        if self.policy and real and not OPERATORS.find(self.operator).interactive:
-            raise HandrailError(f"--operator {self.operator}: expected a person beside a policy on a robot")
+        if real and not OPERATORS.find(self.operator).interactive:
+            raise HandrailError(f"--operator {self.operator}: expected a person, who can stop a robot")
         self._check_rates()
         self._check_sharing()
         for one, other in (("resume", "overwrite"), ("display_data", "display_web")):

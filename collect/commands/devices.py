@@ -11,7 +11,7 @@ from handrail.collect.devices.keyboard import Keyboard
 from handrail.collect.devices.leader_arm import LeaderArm, leader_types, make_teleoperator
 from handrail.collect.devices.spacemouse import SpaceMouse
 from handrail.collect.teleop_config import LEADER, ListDevicesConfig, ShowDeviceConfig
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import message_of
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
 
@@ -33,8 +33,8 @@ def _state(device: Device) -> str:
     """Return whether a device can be opened, else what to do."""
     try:
         device.open()
-    except HandrailError as error:
-        return str(error).removeprefix(f"{device.name}: ")
+    except Exception as error:  # whatever a driver's code raises
+        return message_of(error).removeprefix(f"{device.name}: ")
     finally:
         device.close()
     return "ready"

@@ -24,7 +24,7 @@ SKIP = "-"
 _UNITS = {"degrees": math.pi / 180.0, "radians": 1.0}
 _LEAST = 0.25  # of a quarter turn, to count as one was asked for
 _CLEAR = 0.5  # the second largest change over the largest one, at most
-_LEAST_HANDLE = 5.0  # change of a handle, in its units
+_LEAST_HANDLE = 0.08  # change of a handle [rad]; of one without a unit a degree is one of its steps
 
 Positions = Mapping[str, float]
 
@@ -102,7 +102,7 @@ class _Guide:
         opened = self._positions()
         self._ask("Close the handle, then press Enter: ")
         source, change = self._moved(opened)
-        if not source or abs(change) < _LEAST_HANDLE:
+        if not source or abs(change) * _UNITS.get(self._unit, _UNITS["degrees"]) < _LEAST_HANDLE:
             Terminal().print("No handle has moved: the gripper is closed and opened by a key.")
             return None
         return LeaderGripper(source, closed=opened[source] + change, opened=opened[source])

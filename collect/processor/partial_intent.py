@@ -11,7 +11,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import check_known
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 
 _ACTIONS = {0.0: 1.0, 1.0: None, 2.0: 0.0}  # LeRobot's gripper actions: close, stay, open
 _FOLLOW = 4.0  # of a joint towards the position that is asked for [1/s]
@@ -99,6 +99,6 @@ class PartialIntent:
                 grips[hand] = gripper.closing(value)
             else:
                 values[:], mask[:] = math.nan, True
-        kept = zip(grips, self._grips, strict=True)
-        self._grips = [grip if math.isfinite(grip) else before for grip, before in kept]
+        if np.isfinite([*values, *grips]).all() and abs(now - stamp) <= DEAD_MAN_TIME:  # it is not refused
+            self._grips = [*grips]
         return Intent(values, mask, tuple(grips), "processor", stamp, self._frames)

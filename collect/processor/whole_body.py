@@ -18,7 +18,9 @@ from handrail.controllers.robot.model import RobotModel
 _LEAD = 0.2  # how far a joint's target may be ahead of where the joint is [rad, m]
 _LONGEST = 0.1  # for which a target goes on at once, where commands come late [s]
 _HOLD = 0.5  # for how long a base may go on as it was sent: LeKiwi's watchdog [s]
-_SILENT = 2.5  # periods without an observation, after which velocities say nothing of the way
+_SILENT = 2.5  # periods without an observation, after which velocities say nothing of the way,
+_OFTEN = 0.1  # but this long at least: a robot may speak less often than it is asked [s]
+_BEYOND = 0.5  # of a joint's range, where it may be found [rad, m]
 _PUSHED = 4.0  # a base goes no faster, as a share of its limit: people push robots
 _STROKES = 1.5  # of a gripper whose speed nobody knows [1/s]
 
@@ -52,10 +54,10 @@ class WholeBody:
     Whatever is measured, a target moves no faster than its joint may: `|r⁺ − r| ≤ h v_max`.
 
     A robot without odometry is where its base's velocities have led; where it was not heard for more than
-    2.5 periods, where what it was sent has led. A heading is taken as the same one within ±π. An observation
-    that makes no sense, or the very same object again, is none: the base goes on as it was sent, until the
-    next one. So is one in which a joint is where it cannot have come, `|q⁺ − q| > v_max Δt + 0.2`, or the
-    base faster than four times its limit.
+    2.5 periods (0.1 s at least), where what it was sent has led. A heading is taken as the same one within
+    ±π. An observation that makes no sense, or the very same object again, is none: the base goes on as it was
+    sent, until the next one. So is one in which a joint is where it cannot have come, `|q⁺ − q| > v_max Δt +
+    0.2`, or at first 0.5 beyond its range, or the base faster than four times its limit.
 
     Args:
         model: of the robot.
@@ -73,6 +75,7 @@ class WholeBody:
         self, model: RobotModel, units: RobotUnits, period: float, timeout: float = DEAD_MAN_TIME
     ) -> None:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
+        self._silent = max(_SILENT * period, _OFTEN)
         self._b = len(model.description.base.joints)
         limits = model.description.limits
         self._fastest_base = limits.velocity[:3] if self._b else np.zeros(3)
@@ -135,7 +138,8 @@ class WholeBody:
         if self._reading is None:
             raise HandrailError(
                 f"observation of {self._model.description.name}: expected finite numbers "
-                f"{', '.join(self._units.observation_names)}; got {shown(observation)}"
+                f"{', '.join(self._units.observation_names)}, joints within their ranges in their units; "
+                f"got {shown(observation)}"
             )
         stale = "stale_observation" if now - self._heard > self._timeout else ""
         self.trouble = stale if reading else "malformed_observation"
@@ -149,7 +153,7 @@ class WholeBody:
         passed = _passed(self._time, now, _HOLD)
         if math.inf > now - self._sent_at > _HOLD:  # a watchdog stops the base, if no reading differs
             self._gate.velocity[: self._b] = 0.0
-        silent = now - self._heard > _SILENT * self._period
+        silent = now - self._heard > self._silent
         self._rested = 0.0 if self._twist.any() or silent else self._rested + passed
         going = moved(self._expected(), self._twist, passed) - self._base
         most = 2.0 * _HOLD * self._fastest_base
@@ -185,18 +189,19 @@ class WholeBody:
         return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grips)
 
     def _leaps(self, reading: BodyReading, now: float) -> bool:
-        """Return whether a joint is where it cannot have come since it was heard, or the base is too fast."""
-        way = self._fastest * max(now - self._heard, 0.0)
+        """Return whether a joint is where it cannot have come, or the base is too fast."""
         if self._b and bool((np.abs(reading.twist) > _PUSHED * self._fastest_base).any()):
             return True
-        return self._reading is not None and bool(
-            (np.abs(reading.arm - self._reading.arm) > way + _LEAD).any()
-        )
+        if self._reading is None:
+            lower, upper = self._ends
+            return bool(((reading.arm < lower - _BEYOND) | (reading.arm > upper + _BEYOND)).any())
+        way = self._fastest * max(now - self._heard, 0.0)
+        return bool((np.abs(reading.arm - self._reading.arm) > way + _LEAD).any())
 
     def _take(self, reading: BodyReading, now: float) -> None:
         """Take an observation that makes sense."""
         before, base = self._reading, self._base
-        silent = before is not None and now - self._heard > _SILENT * self._period
+        silent = before is not None and now - self._heard > self._silent
         if before is None:
             self.targets = reading.arm.copy()
             self._grips = 1.0 - reading.openings

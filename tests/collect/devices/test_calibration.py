@@ -87,6 +87,14 @@ def test_another_unit_is_measured_by_the_quarter_turn():
     assert scale == pytest.approx(-0.5 * math.pi / 95.0)
 
 
+def test_a_leader_in_radians_has_a_handle_too():
+    hands = Hands(*((typed, {name: math.radians(each) for name, each in by.items()}) for typed, by in GUIDED))
+    found = run(hands, "radians")
+    assert found.gripper is not None
+    assert found.gripper.closed - found.gripper.opened == pytest.approx(math.radians(-70.0))
+    assert found.joints[UR10[0]].scale == 1.0
+
+
 @pytest.mark.parametrize("turned", [{}, {"pan.pos": 9.0}, {"pan.pos": 80.0, "flex.pos": 60.0}])
 def test_an_unclear_answer_is_asked_again(turned, capsys):
     hands = Hands(("", turned), *GUIDED)

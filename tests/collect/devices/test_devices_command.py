@@ -17,6 +17,8 @@ class Lever:
         self.name, self._trouble = name, trouble
 
     def open(self):
+        if isinstance(self._trouble, Exception):
+            raise self._trouble
         if self._trouble:
             raise HandrailError(f"{self.name}: {self._trouble}")
 
@@ -39,6 +41,11 @@ def test_present_devices_are_ready_and_others_get_advice():
     assert "gamepad ready spacemouse plug one in keyboard " in shown
     assert "leader_arm serial ports: " in shown
     assert "so101_leader" in shown
+
+
+def test_what_a_driver_raises_is_said_in_its_row(monkeypatch):
+    monkeypatch.setattr(devices, "Gamepad", lambda *_: Lever("gamepad", OSError("x11 not available")))
+    assert "gamepad x11 not available spacemouse plug one in" in " ".join(ran(name="devices list").split())
 
 
 def test_readings_of_a_device_are_shown_line_by_line():

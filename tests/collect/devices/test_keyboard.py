@@ -196,6 +196,8 @@ BURSTS = {  # after a link has stalled, all comes at once
     "in what is pasted": b"rm -rf everything\r",
     "after Escape": b"\x1b ",
     "with Control": b"\x00",
+    "with Option on a Mac": "\xa0".encode(),
+    "with Shift on a French keyboard": "\u202f".encode(),
     "after a sequence that broke off": b"\x1b[ ",
     "in the midst of one": b"\x1b[1;2 w",
     "after another": b"\x1bO ",

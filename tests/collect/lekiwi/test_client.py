@@ -135,8 +135,12 @@ def test_red_before_a_lekiwis_camera_is_red_in_the_dataset():
         (("--robot_client", "lawnmower"), "unknown --robot_client 'lawnmower': expected one of lekiwi"),
         (("--robot_client", "lekiwi", "--operator", "browser"), "expected another --operator"),
         (("--robot_client", "lekiwi", "--no_physics"), "expected none of"),
+        (("--robot_client", "lekiwi"), "--operator scripted: expected a person, who can stop a robot"),
         (("--client.simulated",), "expected --robot_client too"),
-        (("--robot_client", "lekiwi", "--client.port_zmq_cmd", "0"), "expected a whole number >= 1"),
+        (
+            ("--robot_client", "lekiwi", "--client.port_zmq_cmd", "0"),
+            "expected a whole number >= 1",
+        ),
     ],
 )
 def test_wrong_flags_are_named(tmp_path, flags, words):

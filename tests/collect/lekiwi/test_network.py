@@ -125,7 +125,7 @@ def test_nobody_there_is_said_in_one_line(tmp_path):
     cmd, observations = free_ports()
     ports = ("--client.port_zmq_cmd", cmd, "--client.port_zmq_observations", observations)
     told = "--robot_client lekiwi: cannot be reached: Timeout waiting for LeKiwi Host"
-    refused(tmp_path / "set", *FLAGS, *ports, told=told)
+    refused(tmp_path / "set", *FLAGS, "--client.simulated", *ports, told=told)
 
 
 def test_lerobots_own_loop_records_through_the_processor(tmp_path, host, monkeypatch, capsys):

@@ -14,6 +14,7 @@ from handrail.collect.lekiwi.link import Link
 from handrail.collect.processor.mpc_step import MaskedMpcStep
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.parts import Limits
 
@@ -146,3 +147,40 @@ def test_clocks_of_a_robot_count_the_sleep_of_the_computer(monkeypatch):
     monkeypatch.setattr(time, "clock_gettime", lambda clock: 3600.0)
     clocks = [inspect.signature(made).parameters["clock"].default for made in (MaskedMpcStep, Link)]
     assert [clock() for clock in clocks] == [3600.0, 3600.0]
+
+
+@pytest.mark.parametrize("rate", [20.0, 75.0, 100.0])
+def test_a_base_is_where_its_wheels_say_though_it_speaks_less_often_than_it_is_asked(rate):
+    """Blocked wheels for 2 s, of a robot that speaks 30 times a second."""
+    units, heard, said = robot_units("lekiwi", DESCRIPTION), -1.0, {}
+    rest = units.action(DESCRIPTION.home[3:], np.zeros(5), np.zeros(3), (0.0,))
+    body = WholeBody(MODEL, units, 1.0 / rate)
+    ahead = np.append(np.where(np.arange(MODEL.size) == 0, 0.1, 0.0), 0.0)
+    for step in range(round(2.0 * rate)):
+        if step / rate - heard > 1 / 31:
+            heard, said = step / rate, dict(rest)
+        state = body.observe(said, step / rate)
+        body.send(ahead)
+    assert abs(state.q[0]) < 0.02
+
+
+@pytest.mark.parametrize("scale", [math.degrees(1.0), -1.0])
+def test_a_robot_in_other_units_is_refused_before_it_moves(scale):
+    """The first observation has to make sense; a joint a little beyond its range does."""
+    arm = load_model(ROOT / "docs/examples/so101.toml")
+    units = robot_units("plain", arm.description)
+    upper = arm.description.limits.position_upper
+    beyond = units.action(upper + 0.4, np.zeros(5), np.zeros(3), (0.0,))
+    assert WholeBody(arm, units, 0.05).observe(beyond, 0.0).q[0] == pytest.approx(upper[0] + 0.4)
+    said = units.action(scale * upper + np.sign(scale), np.zeros(5), np.zeros(3), (0.0,))
+    with pytest.raises(HandrailError, match="joints within their ranges in their units; got"):
+        WholeBody(arm, units, 0.05).observe(said, 0.0)
+
+
+@pytest.mark.parametrize("refused", [{"d": math.nan}, {"d": 0.1, "time": -1.0}, {"d": 0.1, "typo": 0.1}])
+def test_the_gripper_of_an_action_that_is_refused_is_forgotten(refused):
+    drive = Drive(inputs={"d": ["ee.vx", 0.05]})
+    opened = drive.go({"d": 0.1}, 0.5)["gripper.pos"]
+    drive.go(refused | {"gripper": 1.0}, 0.5)
+    assert drive.go({"d": 0.1}, 1.0)["gripper.pos"] == pytest.approx(opened)
+    assert drive.go({"d": 0.1, "gripper": 1.0}, 1.0)["gripper.pos"] != pytest.approx(opened, abs=0.1)
