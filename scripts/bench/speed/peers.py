@@ -69,7 +69,7 @@ class Peer:
 def _ipopt(loop: TimingLoop) -> Take:
     """Return the converged solver, IPOPT, from the same guess."""
     settings = loop.mpc.settings
-    solver = ConvergedSolver(loop.mpc.residuals, settings.horizon, loop.model.size)
+    solver = ConvergedSolver(loop.mpc.residuals, settings.horizon, loop.model.size, settings.dt)
 
     def take(update: Update) -> Solve:
         def solve() -> FloatArray | None:
