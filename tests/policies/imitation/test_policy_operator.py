@@ -39,8 +39,8 @@ class Plans:
         return self.rows
 
 
-def shared(policy) -> Any:
-    """Return a person who rests beside a policy whose action is the hand's six numbers and the gripper."""
+def driver(policy) -> Any:
+    """Return the operator of a policy whose action is the hand's six numbers and the gripper."""
     names = channels_of(ONE).names[3:9]
     interface = SimpleNamespace(
         action_names=(*names, "gripper"),
@@ -49,8 +49,12 @@ def shared(policy) -> Any:
     )
     checkpoint = SimpleNamespace(meta=SimpleNamespace(mode="base+ee", task="", interface=interface))
     env = SimpleNamespace(model=ONE, task=SimpleNamespace(description=""))
-    operator = PolicyOperator(policy, checkpoint, env, PERIOD)  # pyright: ignore[reportArgumentType]
-    made = SharedOperator(Fake(asks()), operator, arbiter("by_mask"), ONE)
+    return PolicyOperator(policy, checkpoint, env, PERIOD)  # pyright: ignore[reportArgumentType]
+
+
+def shared(policy) -> Any:
+    """Return a person who rests beside the policy."""
+    made = SharedOperator(Fake(asks()), driver(policy), arbiter("by_mask"), ONE)
     made.reset(view(0.0), np.random.default_rng(0))
     return made
 
@@ -128,12 +132,13 @@ def test_the_pictures_of_a_moment_count_once():
     """Asked again at the same time, as after a hand-back, a policy sees the same again."""
     policy, seen = Plans(), []
     policy.encoder = Looks()
-    operator = shared(policy)
+    operator = driver(policy)
+    operator.reset(view(0.0), np.random.default_rng(0))
     policy.act = lambda state, around, *rest: seen.append(around) or ROWS[0]
     for time, x in [(0.05, 1.0), (0.1, 1.2), (0.1, 1.2)]:
         policy.encoder.x = x
         operator.act(view(time))
-        operator._policy.replan()
+        operator.replan()
     np.testing.assert_array_equal(*seen[-2:])
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 from study_helpers import DESIGN, changed, everything
 
+from handrail.datasets.format.layout import Layout
 from handrail.policies.study import work as work_module
 from handrail.policies.study.jobs import StudyLayout, jobs
 from handrail.policies.study.settings import evaluations, load_design
@@ -45,7 +46,9 @@ def test_a_policy_whose_earlier_checkpoints_are_gone_drives_no_more_or_learns_an
 def test_a_recording_that_was_killed_ends_where_another_does(killed, tmp_path, preset, monkeypatch):
     design, layout, rows = changed(load_design(preset), episodes=12), StudyLayout(tmp_path), []
     (job, *_) = jobs(design)
-    layout.dataset(job.cell).mkdir(parents=True)
+    info = Layout(layout.dataset(job.cell)).info
+    info.parent.mkdir(parents=True)
+    info.touch()
 
     def record(config, share=None):
         for _ in range(config.dataset.num_episodes):

@@ -73,8 +73,8 @@ def test_a_mode_that_does_not_steer_the_hand_throughout_is_refused(env, mode):
             ("--task", "reach", "--arbitration.alpha", "0.4"),
             "--arbiter, --arbitration: expected --policy too",
         ),
-        ((*REAL, "--operator", "supervisor"), "--operator supervisor: expected a person beside a policy"),
-        ((*REAL, "--operator", "scripted"), "--operator scripted: expected a person beside a policy"),
+        ((*REAL, "--operator", "supervisor"), "--operator supervisor: expected a person"),
+        ((*REAL, "--operator", "scripted"), "--operator scripted: expected a person"),
     ],
 )
 def test_a_task_that_nobody_could_supervise_is_refused(tmp_path, flags, told):
