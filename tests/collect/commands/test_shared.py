@@ -17,6 +17,7 @@ from command_helpers import command, refused
 from execution_helpers import is_alive
 from shared_helpers import content, pictures, saved, started, wait_until, workers_of
 
+from handrail.collect.client_config import ClientConfig
 from handrail.collect.commands.account import RecordingLog
 from handrail.collect.commands.shared import Shards
 from handrail.collect.config import DatasetConfig, RecordConfig
@@ -188,7 +189,16 @@ def test_half_removed_shards_are_no_part_of_the_next_recording(alone, tmp_path):
         (100, {"operator": "browser"}, 1),
         (100, {"realtime": True}, 1),
         (100, {"display_web": True}, 1),
-        (100, {"robot": "lekiwi", "robot_client": "lekiwi", "task": "reach"}, 1),
+        (
+            100,
+            {
+                "robot": "lekiwi",
+                "robot_client": "lekiwi",
+                "client": ClientConfig(simulated=True),
+                "task": "reach",
+            },
+            1,
+        ),
     ],
 )
 def test_all_cores_record_where_that_pays_and_is_safe(episodes, settings, expected, monkeypatch):

@@ -185,7 +185,7 @@ def test_velocity_commands_are_tracked(robot):
             target = closing(env.model, grip=0.0).astype(np.float32)
             target[joint] = sign * speed
             before = 0.0
-            for _ in range(16):
+            for _ in range(14):
                 env.step(target)
                 commanded = env.state().commanded[joint]
                 lag = abs(env.state().v[joint] - commanded) / limits.acceleration[joint]
