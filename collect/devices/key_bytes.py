@@ -8,7 +8,6 @@ from typing import Literal
 Change = Literal["down", "again", "up"]
 FOCUS_IN, FOCUS_OUT = "focus_in", "focus_out"
 TELLS_RELEASES, THERE, INTERRUPT = "tells_releases", "there", "interrupt"
-SIGNALS = (FOCUS_IN, FOCUS_OUT, TELLS_RELEASES, THERE, INTERRUPT)  # what a terminal says that is no key
 _ESCAPE = 0x1B
 _ALONE = 0.05  # after that, an Escape is the key and no sequence [s]
 _LONGEST = 64  # of a sequence [bytes]
@@ -24,7 +23,7 @@ NAMES = frozenset({*_NAMED.values(), *_ARROWS.values(), *(chr(code).lower() for 
 
 @dataclass(frozen=True)
 class Key:
-    """An event of a key, or one of `SIGNALS`."""
+    """An event of a key, or what a terminal says that is no key (`FOCUS_IN`, `THERE`, …)."""
 
     name: str
     """The character, or a name such as `enter`."""

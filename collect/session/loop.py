@@ -173,7 +173,7 @@ class EpisodeLoop:
             state=seen["agent_pos"],
             environment=seen["environment_state"],
             images=seen.get("pixels", {}),
-            intent=in_usual_frames(intent, env.model, now.view.state.q) or intent,
+            intent=in_usual_frames(intent, env.model, now.view.state.q, exactly=False) or intent,
             action=now.info["sent"],
             command=action.astype(np.float32),
             diagnostics=now.command.diagnostics,

@@ -9,7 +9,7 @@ from handrail.collect.world.geometry import VISIBLE_GROUP
 from handrail.collect.world.gl import MjData, MjModel, missing_graphics, mujoco
 from handrail.controllers.errors import check_known
 
-_MOST_GEOMS = 300
+_MORE_GEOMS = 300  # than the model has: what films draw beside it
 _LASTING = (
     *("mesh_vert", "mesh_normal", "mesh_face", "mesh_vertadr", "mesh_faceadr"),
     *("tex_data", "tex_adr", "mat_texid", "mat_texrepeat", "mat_texuniform"),
@@ -73,7 +73,7 @@ class Painter:
         if self._loaded is None or drawn != self._drawn:
             self._upload(model)
             self._drawn = drawn
-        self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
+        self._scene = mujoco.MjvScene(model, model.ngeom + _MORE_GEOMS)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._scene.flags[flag] = self._pretty
         self._model = model

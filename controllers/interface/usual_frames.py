@@ -29,11 +29,12 @@ def commanded_rows(intent: Intent, model: RobotModel, q: FloatArray) -> tuple[Fl
     return matrix[usual.mask], usual.values[usual.mask]
 
 
-def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent | None:
+def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray, exactly: bool = True) -> Intent | None:
     """Return the intent as it is meant in the usual frames at q, (n,); None where a mask cannot be turned.
 
     A mask that has some axes of a translation or a rotation, but not all three, is of its own frame alone; so
-    is the translation of another tool point without the rotation.
+    is the translation of another tool point without the rotation. Not `exactly`, it is turned nevertheless,
+    and what it then has on channels that it does not command is lost.
     Unknown frames, and values of another size, stay: the controller brakes.
     """
     channels, frames = Channels.of(model.description), intent.frames
@@ -42,7 +43,7 @@ def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent 
         return intent
     values = np.where(intent.mask, intent.values, 0.0)
     if frames.base == "world" and channels.base:
-        if intent.mask[0] != intent.mask[1]:
+        if exactly and intent.mask[0] != intent.mask[1]:
             return None
         values[:3] = turned(values[:3], -q[2])
     if frames.tool == "world" and not frames.point.any():  # hands already are in the usual frame
@@ -55,7 +56,7 @@ def in_usual_frames(intent: Intent, model: RobotModel, q: FloatArray) -> Intent 
         parts = [slice(place.start + first, place.start + first + 3) for first in (0, 3)]
         moves, turns = (intent.mask[part] for part in parts)
         partly = any(each.any() != each.all() for each in (moves, turns))
-        if partly or (frames.point.any() and moves.any() and not turns.any()):
+        if exactly and (partly or (frames.point.any() and moves.any() and not turns.any())):
             return None
         rotation = np.asarray(pose.rotation)
         if frames.tool == "tool":

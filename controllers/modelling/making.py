@@ -159,9 +159,10 @@ class RobotMaker:
     def _choose_pairs(self, met: Meetings) -> set[str]:
         """List pairs that can meet; return the shapes of them that are too fat."""
         disabled, fat, pairs = self._source.disabled_pairs(), set(), []
+        frames = {each["name"]: each["frame"] for each in self.tables["collision"]}
         for index in np.flatnonzero(met.distances.min(axis=0) < _NEAR):
             pair, overlap, column = met.pairs[index], met.overlap[index], met.distances[:, index]
-            doubted = overlap > _OFTEN or frozenset(pair) in disabled
+            doubted = overlap > _OFTEN or frozenset(map(frames.get, pair)) in disabled
             touch = met.share(index) if doubted else 1.0
             if touch > 0.0 and met.joints[index] not in met.nested:
                 narrow = np.quantile(column, 0.9) < _NARROW * self.tables["world"]["scale"]

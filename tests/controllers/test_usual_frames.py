@@ -1,5 +1,7 @@
 """The same twist in the usual frames: what the robot does is the same, or there is no answer."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -88,10 +90,15 @@ def test_a_twist_with_missing_axes_of_its_own_frame_has_no_usual_one(robot, fram
     hand = channels.hands[-1][0].split(".")[0]
     missing = [name if name.startswith("base") else hand + name for name in lacks]
     mask = channels.mask("base", hand) & ~channels.mask(*missing)
-    assert (
-        in_usual_frames(Intent(np.zeros(channels.size), mask, frames=frames), model, np.ones(model.size))
-        is None
-    )
+    intent = Intent(np.ones(channels.size), mask, frames=frames)
+    assert in_usual_frames(intent, model, np.ones(model.size)) is None
+    nevertheless = in_usual_frames(intent, model, np.ones(model.size), exactly=False)
+    assert nevertheless is not None  # what a dataset has of it
+    whole = replace(intent, values=np.where(mask, 1.0, 0.0), mask=np.ones_like(mask))
+    expected = in_usual_frames(whole, model, np.ones(model.size))
+    assert expected is not None
+    np.testing.assert_allclose(nevertheless.values[mask], expected.values[mask])
+    assert np.array_equal(nevertheless.mask, mask)
 
 
 @both

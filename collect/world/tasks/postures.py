@@ -13,10 +13,11 @@ _LAID_OUT = 1.49  # of the tool ahead of the base's centre at home [m]
 
 
 def near_home(model: RobotModel, rng: np.random.Generator) -> FloatArray:
-    """Return home with a little noise: 10 cm · scale, 0.15 rad, 0.05 rad in the arm's joints, (n,)."""
+    """Return home with noise within limits: 10 cm · scale, 0.15 rad, 0.05 rad in the arm's joints, (n,)."""
     base, away = len(model.description.base.joints), 0.10 * model.description.world.scale
     spread = np.concatenate([np.array([away, away, 0.15])[:base], np.full(model.size - base, 0.05)])
-    return model.description.home + rng.uniform(-spread, spread)
+    q, limits = model.description.home + rng.uniform(-spread, spread), model.description.limits
+    return np.clip(q, limits.position_lower, limits.position_upper)
 
 
 def reach_share(model: RobotModel) -> float:

@@ -121,7 +121,7 @@ class PolicyInterface:
         if state.ndim == 1:
             numbers = self.observe(state[None], environment[None])
             return numbers[0][0], numbers[1][0]
-        state, environment = np.asarray(state, float), np.asarray(environment, float)
+        state, environment = np.asarray(state, float), np.asarray(environment, float).reshape(len(state), -1)
         poses = [self.pose(state, hand) for hand in range(len(self.tools))]
         base = [poses[0].base_seen] if self._shows_base else []
         own = [self._of(state, self._own), *(pose.tool_seen for pose in poses), *base]

@@ -1,14 +1,22 @@
 """A picture depends on what is drawn, not on what was drawn before."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env
 from handrail.collect.world import rendering
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.gl import mujoco
 from handrail.collect.world.rendering import Painter
+from handrail.collect.world.scene import Scene, SceneObject
+from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.task import FixedTask, Start, Verdict
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.shape import Shape
 
 
 @pytest.fixture(scope="module")
@@ -73,3 +81,17 @@ def test_whatbulges_stays_round():
     painter.close()
     width, height = ball.any(axis=0).sum(), ball.any(axis=1).sum()
     assert 0.74 < ball.sum() / (width * height) < 0.83  # π/4; of a double cone it is a half
+
+
+@pytest.mark.needs_gl
+def test_things_are_drawn_however_many_there_are():
+    """A wall behind 400 small boxes, the last of the scene, is seen."""
+    small, pictures = Shape("box", np.full(3, 0.02)), []
+    boxes = [SceneObject(f"box_{n}", small, np.array([5.0, 0.05 * n, 0.02])) for n in range(400)]
+    wall = SceneObject("wall", Shape("box", np.array([0.5, 0.5, 0.5])), np.array([1.2, 0.0, 0.5]))
+    for things in (boxes, [*boxes, wall]):
+        start = Start(Scene(tuple(things)), load_model().description.home)
+        task = FixedTask(start, lambda state: Verdict(False), 10.0)
+        with closing(HandrailEnv(task, plant=Simulation, cameras=("scene",))) as env:
+            pictures.append(env.reset(seed=0)[0]["pixels"]["scene"].astype(int))
+    assert np.abs(pictures[1] - pictures[0]).max() > 50

@@ -1,5 +1,7 @@
 """Tasks: what they sample, and how they judge."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from collect_helpers import UP, action, environment, hold, moved, over_cube, reach
@@ -9,9 +11,10 @@ from handrail.collect.world.task import Start
 from handrail.collect.world.tasks import obstacles
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.pick_place import PickPlace
+from handrail.collect.world.tasks.postures import near_home
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import robot_names
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import RobotModel, load_model
 
 SEEDS = range(60)
 
@@ -171,3 +174,15 @@ def test_no_room_for_obstacles_is_an_error(monkeypatch):
     monkeypatch.setattr(obstacles, "CLEARANCE", 3.0)
     with pytest.raises(HandrailError, match="no room for"):
         PickPlace().sample(load_model(), np.random.default_rng(0))
+
+
+def test_no_episode_begins_beyond_a_limit():
+    """Also of a robot whose home is at one."""
+    model = load_model()
+    home = np.where(
+        np.arange(model.size) > 4, model.description.limits.position_upper, model.description.home
+    )
+    at_one = RobotModel(replace(model.description, home=home))
+    for seed in range(20):
+        q = near_home(at_one, np.random.default_rng(seed))
+        assert (q <= upper).all()

@@ -137,6 +137,17 @@ def test_an_older_checkpoint_keeps_its_view():
         read_interface(content | {"base_pose": "yes"})
 
 
+def test_a_task_of_one_number_is_seen_too():
+    """A column of one number is a list, without a second axis."""
+    columns = episode(np.random.default_rng(3), [("ee",)])
+    opening = columns["observation.environment_state"][:, ENVIRONMENT.index("drawer.opening")]
+    columns["observation.environment_state"] = opening
+    one = Feature("float32", (1,), ("drawer.opening",))
+    features = FEATURES | {"observation.environment_state": one}
+    interface = PolicyInterface.of_dataset(features, [columns], "realised")
+    np.testing.assert_allclose(observed(interface, columns)[1][:, 0], opening, rtol=1e-6)
+
+
 def test_a_policy_does_not_see_how_fast_the_robot_moves():
     columns, interface = made(1, "realised")
     faster, farther = (np.array(columns["observation.state"]) for _ in range(2))
