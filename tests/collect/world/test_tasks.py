@@ -179,10 +179,8 @@ def test_no_room_for_obstacles_is_an_error(monkeypatch):
 def test_no_episode_begins_beyond_a_limit():
     """Also of a robot whose home is at one."""
     model = load_model()
-    home = np.where(
-        np.arange(model.size) > 4, model.description.limits.position_upper, model.description.home
-    )
+    upper = model.description.limits.position_upper
+    home = np.where(np.arange(model.size) > 4, upper, model.description.home)
     at_one = RobotModel(replace(model.description, home=home))
     for seed in range(20):
-        q = near_home(at_one, np.random.default_rng(seed))
-        assert (q <= upper).all()
+        assert (near_home(at_one, np.random.default_rng(seed)) <= upper).all()
