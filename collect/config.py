@@ -52,7 +52,7 @@ class SessionConfig:
     person: Advanced[Count] = 0
     """Which person the scripted operator is; persons differ in delay, noise and all the rest."""
     time_limit: Annotated[float, Meta(ge=0, le=MOST_TIME)] = 0.0
-    """Time after which an episode is given up [s]; the task's own when 0."""
+    """Time after which an episode ends, saved as failed [s]; the task's own when 0."""
     moving_obstacles: Advanced[Annotated[int, Meta(ge=0, le=MOST_MOVING)]] = 0
     """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
     robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
