@@ -1,6 +1,7 @@
 """The figures on the pages of results, and README's, are those of the JSON beside them."""
 
 import json
+import lzma
 import re
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -15,7 +16,10 @@ from handrail.datasets.statistics.paired import paired_difference, paired_succes
 from handrail.scripts.bench.goal_reaching.metrics import METRICS
 
 FOLDER = ROOT / "docs" / "results"
-NUMBERS = {file.stem: json.loads(file.read_text()) for file in sorted(FOLDER.glob("*.json"))}
+NUMBERS = {file.stem: json.loads(file.read_text()) for file in sorted(FOLDER.glob("*.json"))} | {
+    file.name.partition(".")[0]: json.loads(lzma.decompress(file.read_bytes()))
+    for file in sorted(FOLDER.glob("*.json.xz"))
+}
 RUNS = {name: run for name, run in NUMBERS.items() if name.startswith("goal_reaching_")}
 PAGES = [page for page in RESULTS if any(name.startswith(Path(page).stem) for name in NUMBERS)]
 UNITS = (1, 100, 1000, 1e-6, 1 / 60)  # %, mm and ms, millions, minutes
