@@ -145,8 +145,8 @@ class StoredConfig:
             raise HandrailError(
                 "dataset: expected its folder, such as outputs/reach, or --dataset.repo_id; got neither"
             )
-        hub = Path(os.environ.get("HF_HOME", "~/.cache/huggingface")).expanduser()
-        return Path(os.environ.get("HF_LEROBOT_HOME", hub / "lerobot")).expanduser() / self.repo_id
+        hub = Path(os.environ.get("HF_HOME", "~/.cache/huggingface"), "lerobot")
+        return Path(os.environ.get("HF_LEROBOT_HOME", hub)).expanduser() / self.repo_id
 
 
 @dataclass(frozen=True)

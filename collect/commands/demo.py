@@ -13,6 +13,7 @@ from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.folder import is_dataset
 
 NEXT = """Next:
@@ -38,6 +39,8 @@ def demo(config: DemoConfig) -> int:
     root = config.folder / "dataset"
     if is_dataset(Layout(root)) and not config.overwrite:
         raise HandrailError(f"{root}: an earlier demo is there; say --overwrite, or choose another folder")
+    if is_dataset(Layout(root)) and (found := read_info(root).episodes) > config.episodes:
+        raise HandrailError(f"{root}: {found} episodes, more than a demo has; choose another folder")
     dataset = DatasetConfig(repo_id=REPO_ID, root=str(root), num_episodes=config.episodes)
     console.print(f"Recording {config.episodes} episodes: the operator steers the hand, the MPC the rest …")
     code = record(RecordConfig(dataset=dataset, cameras=cameras, overwrite=config.overwrite))

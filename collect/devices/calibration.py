@@ -1,6 +1,7 @@
 """Which joint of a leader arm drives which joint of the robot's arm, which way, and how far."""
 
 import math
+import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -125,4 +126,4 @@ def how_to_calibrate(leader: LeaderConfig, robot: str) -> str:
     """Return the command that calibrates a leader for a robot."""
     given = {f"--teleop.{each.name}": getattr(leader, each.name) for each in fields(LeaderConfig)}
     flags = (f"{flag}={value}" for flag, value in (*given.items(), ("--robot", robot)) if value)
-    return " ".join(["handrail-devices calibrate", *flags])
+    return shlex.join(["handrail-devices", "calibrate", *flags])

@@ -125,20 +125,20 @@ class MaskedMpcStep(RobotActionProcessorStep):
     def reset(self) -> None:
         """Forget the past; the base is at `start` with the next observation, as fast as that says."""
         self._body.reset(self.start, rests=False)
-        self._intent.reset()
         self._mpc.reset(self._around)
-        self._braking, self._before = "", math.inf
+        self._braking, self._before, self._closed = "", math.inf, (math.nan,)
 
     def action(self, action: RobotAction) -> RobotAction:
         """Return the whole robot's action."""
         now = float(self.clock())
         self._note_lateness(now)
         state = self._body.observe(self.transition.get(TransitionKey.OBSERVATION), now)
-        intent = self._intent.read(action, self._body.targets, self._body.openings, now)
+        closed = np.where(np.isnan(self._closed), 1.0 - self._body.openings, self._closed)
+        intent = self._intent.read(action, self._body.targets, closed, now)
         if self._body.trouble:
             intent = replace(intent, time=LONG_AGO)
         command = self._mpc.update(state, intent)
-        self.diagnostics = command.diagnostics
+        self.diagnostics, self._closed = command.diagnostics, command.grippers
         self._note_brake(command.diagnostics)
         return self._body.send(np.append(command.velocity(1.0 / self.fps), command.grippers))
 

@@ -11,7 +11,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import check_known
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
-from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
+from handrail.controllers.interface.intent import Intent
 
 _ACTIONS = {0.0: 1.0, 1.0: None, 2.0: 0.0}  # LeRobot's gripper actions: close, stay, open
 _FOLLOW = 4.0  # of a joint towards the position that is asked for [1/s]
@@ -55,28 +55,20 @@ class PartialIntent:
         for name, (channel, scale) in inputs.items():
             check_known(f"channel of input {name}:", (channel,), channels.names)
             self._scaled[name] = (channels.names.index(channel), scale)
-        own = enumerate(units.grippers)
-        self._of_robot = {gripper.name: (hand, gripper) for hand, gripper in own if gripper}
-        self.reset()
+        self._of_robot = {each.name: (hand, each) for hand, each in enumerate(units.grippers) if each}
 
-    def reset(self) -> None:
-        """Forget how far the grippers were asked to close."""
-        self._grips: list[float | None] = [None] * len(self._channels.hands)
-
-    def read(self, action: Any, targets: FloatArray, openings: FloatArray, now: float) -> Intent:
+    def read(self, action: Any, targets: FloatArray, closed: FloatArray, now: float) -> Intent:
         """Return the intent of an action; one that is malformed says so by numbers that are none.
 
         Args:
             action: of a teleoperator.
             targets: where the arm's joints are sent now, (n − b,).
-            openings: of the grippers, (h,).
+            closed: how far each gripper is to be closed if the action does not say it, (h,).
             now: the time of an action that says none [s].
         """
         values, mask = np.zeros(self._channels.size), np.zeros(self._channels.size, dtype=bool)
         entries = action if isinstance(action, Mapping) else {"": math.nan}
-        units, stamp = self._units, now
-        pairs = zip(self._grips, openings, strict=True)
-        grips = [1.0 - opening if grip is None else grip for grip, opening in pairs]
+        units, stamp, grips = self._units, now, closed.tolist()
         for name in entries:
             value = number(entries, name)
             if name in self._scaled:
@@ -99,6 +91,4 @@ class PartialIntent:
                 grips[hand] = gripper.closing(value)
             else:
                 values[:], mask[:] = math.nan, True
-        if np.isfinite([*values, *grips]).all() and abs(now - stamp) <= DEAD_MAN_TIME:  # it is not refused
-            self._grips = [*grips]
         return Intent(values, mask, tuple(grips), "processor", stamp, self._frames)

@@ -34,7 +34,7 @@ class VideoFile:
     """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int) -> None:
-        self._path, self._partial = path, beside(path, "partial")
+        self._path, self._partial = path, beside(path.absolute(), "partial")  # "a:b" is none of FFmpeg's URLs
         self._container = av.open(str(self._partial), "w", format="mp4")
         self._stream = self._container.add_stream(
             "libx264", rate=fps, options={"crf": "20", "preset": "medium", "x264-params": "log=-1"}

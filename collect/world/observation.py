@@ -79,8 +79,7 @@ def bounded(numbers: FloatArray) -> NDArray[np.float32]:
     """Return the numbers as float32 within the space's bounds."""
     if numbers.dot(numbers) <= _BOUND:  # they are
         return numbers.astype(np.float32)
-    within = np.minimum(np.maximum(numbers, -_BOUND), _BOUND)
-    return np.where(np.isnan(within), 0.0, within).astype(np.float32)
+    return np.nan_to_num(np.clip(numbers, -_BOUND, _BOUND)).astype(np.float32)
 
 
 def box_space(size: int) -> spaces.Space[Any]:

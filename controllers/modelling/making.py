@@ -121,6 +121,7 @@ class RobotMaker:
         held = {link.link for link in fingers}
         clouds = [cloud for cloud in link_clouds(model) if cloud.link not in held]
         parts: dict[str, tuple[str, FloatArray]] = {}
+        link_of: dict[str, str] = {}  # of each frame that shapes are on
         taken, links = {*(shape["name"] for shape in given), "floor"}, {cloud.link for cloud in clouds}
 
         def cut(name: str, frame: str, pieces: list[FloatArray]) -> None:
@@ -135,12 +136,13 @@ class RobotMaker:
             link = max(body, key=lambda cloud: np.prod(np.ptp(cloud.triangles, axis=(0, 1)))).link
             own = [frame for frame in hands if body_frame(model.pinocchio, frame).parentJoint == joint]
             every = np.vstack([cloud.triangles for cloud in body])
+            link_of[(own or [link])[0]] = link
             cut(link, (own or [link])[0], pieces(every, _CUTS, _CUT, least))
         for _ in range(_ROUNDS):
             shapes = [_shape(model, name, *part) for name, part in parts.items()]
             self.tables["collision"] = given + shapes
             met = Meetings(self.model(), [*clouds, *fingers], _SAMPLES)
-            if not (fat := self._choose_pairs(met)):
+            if not (fat := self._choose_pairs(met, link_of)):
                 break
             for name in sorted(fat & parts.keys()):
                 cut(name, parts[name][0], pieces(parts[name][1], 1, np.inf, -np.inf))
@@ -156,13 +158,13 @@ class RobotMaker:
         both = [each for share in SHARES for each in self._finder.finger_clouds(frame, share)]
         return [link.moved(on.parentJoint, on.placement) for each in both for link in each]
 
-    def _choose_pairs(self, met: Meetings) -> set[str]:
+    def _choose_pairs(self, met: Meetings, link_of: dict[str, str]) -> set[str]:
         """List pairs that can meet; return the shapes of them that are too fat."""
         disabled, fat, pairs = self._source.disabled_pairs(), set(), []
-        frames = {each["name"]: each["frame"] for each in self.tables["collision"]}
+        links = {each["name"]: link_of.get(each["frame"], each["frame"]) for each in self.tables["collision"]}
         for index in np.flatnonzero(met.distances.min(axis=0) < _NEAR):
             pair, overlap, column = met.pairs[index], met.overlap[index], met.distances[:, index]
-            doubted = overlap > _OFTEN or frozenset(map(frames.get, pair)) in disabled
+            doubted = overlap > _OFTEN or frozenset(map(links.get, pair)) in disabled
             touch = met.share(index) if doubted else 1.0
             if touch > 0.0 and met.joints[index] not in met.nested:
                 narrow = np.quantile(column, 0.9) < _NARROW * self.tables["world"]["scale"]

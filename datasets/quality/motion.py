@@ -106,7 +106,7 @@ def phase_boundaries(episode: Demonstration, scale: Scale) -> IntArray:
             states = [episode.column("phase").reshape(episode.count, -1)[:, 0]]
         else:
             states = [gripper_state(each, scale.widest_opening) for each in episode.grippers.T]
-        found = np.unique(np.concatenate([_changes(each) for each in states]))
+        found = np.unique(np.concatenate([np.flatnonzero(each[1:] != each[:-1]) + 1 for each in states]))
     except DoesNotApply:
         found = np.empty(0, int)
     return found if found.size else farthest(episode.motion)
@@ -131,7 +131,3 @@ def gripper_state(opening: FloatArray, widest: float = 0.0) -> IntArray:
 def farthest(positions: FloatArray) -> IntArray:
     """Return the frame that is farthest from the first, `(1,)`."""
     return np.array([np.linalg.norm(positions - positions[0], axis=1).argmax()])
-
-
-def _changes(labels: np.ndarray) -> IntArray:
-    return np.flatnonzero(labels[1:] != labels[:-1]) + 1

@@ -171,11 +171,12 @@ class Demonstration(Episode):
 
     @cached_property
     def inputs(self) -> FloatArray:
-        """The operator's input, zero on axes not owned and without the gripper, `(N, u)`."""
+        """The operator's input, zero on axes that they did not own and without the gripper, `(N, u)`."""
         values = self.matrix("asked")
-        owned = self.matrix("owned")[:, : values.shape[1]] if self.has("owned") else np.empty(0)
-        if owned.shape == values.shape:  # those of the grippers come after the channels
-            values = np.where(owned.astype(bool), values, 0.0)
+        for part, least in (("owned", 1), ("owner", 2)):  # beside a policy 1 is the policy
+            held = self.matrix(part)[:, : values.shape[1]] if self.has(part) else np.empty(0)
+            if held.shape == values.shape:  # those of the grippers come after the channels
+                values = np.where(held >= least, values, 0.0)
         axes = self.entries("asked") or map(str, range(values.shape[1]))
         return values[:, [place for place, name in enumerate(axes) if "gripper" not in name]]
 

@@ -199,8 +199,7 @@ def _finite(numbers: FloatArray) -> FloatArray:
     """Return numbers cut to ±`MOST`; what is none becomes 0."""
     if numbers.dot(numbers) <= MOST:  # all are
         return numbers
-    within = np.minimum(np.maximum(numbers, -MOST), MOST)
-    return np.where(np.isnan(within), 0.0, within)
+    return np.nan_to_num(np.clip(numbers, -MOST, MOST))
 
 
 def _finite_number(number: float) -> float:

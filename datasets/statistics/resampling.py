@@ -1,5 +1,6 @@
 """Intervals by resampling: of means, of differences, and of what is nested."""
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -101,7 +102,8 @@ def p_of_means(
     p = permutation_p(samples, difference_of_means if paired else welch, paired, rng, tests)
     if paired:
         return p
-    of_t: Any = stats.ttest_ind(*samples, equal_var=False)
+    with warnings.catch_warnings(action="ignore"):  # of a sample that does not vary
+        of_t: Any = stats.ttest_ind(*samples, equal_var=False)
     return float(np.fmax(p, of_t.pvalue))
 
 

@@ -15,7 +15,7 @@ from handrail.datasets.reading.load import read_demonstrations
 def main(folder: str) -> None:
     """Print a line an episode, and the mean smoothness."""
     values = []
-    for episode in read_demonstrations(folder):  # of any LeRobot dataset, whoever recorded it
+    for episode in read_demonstrations(folder):  # of any LeRobot dataset that has these columns
         tool = episode.motion  # where the hand was, (N, 3) [m]
         speed = np.linalg.norm(np.diff(tool, axis=0), axis=1) * episode.fps
         values.append(sparc(speed, episode.fps))

@@ -20,6 +20,7 @@ from scipy import stats
 
 MARKS = "osD^v"  # a study each, and a colour a mode
 COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b4b8a", "#7f7f7f"]
+COLOURS += ["#882255", "#999933"]
 
 
 def read(archive):

@@ -153,14 +153,10 @@ def answer(found: Sequence[Contrast], design: StudyDesign) -> list[str]:
     if not tested:
         return ["No draw has all that is declared on all tasks yet: nothing can be said."]
     if design.rounds:
-        return [sentence(each, name, _sides(each)) for name, each in tested.items()]
+        return [sentence(v, k, " against ".join(map(percent, v.sides or ()))) for k, v in tested.items()]
     return [sentence(each, name) for name, each in tested.items()] + [
         _equivalent(tested[each.label], each) for each in asked if each.margin and each.label in tested
     ]
-
-
-def _sides(each: Contrast) -> str:
-    return " against ".join(percent(side) for side in each.sides or ())
 
 
 def _equivalent(found: Contrast, asked: Declared) -> str:

@@ -1,5 +1,6 @@
 """The tables of a study, for a page in HTML and one in Markdown alike."""
 
+import shlex
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any
@@ -198,4 +199,4 @@ def cells_table(results: Results, name: str) -> Table:
 
 def cell_command(name: str, cell: str) -> str:
     """Return the command that records, trains and evaluates one cell of a study anew."""
-    return f"handrail-study --preset {name} --only {cell} --output outputs/again"
+    return f"handrail-study --preset {shlex.quote(name)} --only {cell} --output outputs/again"

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -42,15 +43,14 @@ class ReportConfig:
 
 def command_line(name: str, config: Any) -> str:
     """Return the command of a bench that gives these settings: the flags that differ from their defaults."""
-    words = [PROGRAM, name]
+    words = [*PROGRAM.split(), name]
     for entry in fields(config):
         value = getattr(config, entry.name)
         if isinstance(value, bool) and value != entry.default:
             words.append("--" + ("" if value else "no_") + entry.name)
         elif value != entry.default:
-            shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
-            words.append(f"--{entry.name} {shown}")
-    return " ".join(words)
+            words += ["--" + entry.name, *map(str, value if isinstance(value, tuple) else (value,))]
+    return shlex.join(words)
 
 
 def report(

@@ -291,5 +291,14 @@ def test_a_link_that_can_hit_the_one_that_carries_it_is_named(tmp_path):
     assert "l5 – l6" not in said  # which turn about the axis along them
 
 
+def test_a_srdf_leaves_out_what_never_meets_the_body_of_the_hand(tmp_path):
+    (tmp_path / "one.srdf").write_text(
+        '<robot name="one"><disable_collisions link1="l4" link2="l6"/></robot>'
+    )
+    pairs = one_made(tmp_path, one_arm(NAMES, {})).model().description.self_pairs
+    assert ("l3", "l6") in pairs
+    assert ("l4", "l6") not in pairs
+
+
 def test_a_hull_of_few_points_is_these_points():
     assert hull(np.eye(3)).tolist() == np.eye(3).tolist()

@@ -11,7 +11,7 @@ import pytest
 from command_helpers import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from toml_helpers import mutated
+from toml_helpers import mutated, spoilt
 
 from handrail.collect.world.scene import Scene, SceneObject, box
 from handrail.collect.world.stage import add_scene, new_stage
@@ -46,10 +46,8 @@ def test_an_entry_of_another_kind_is_one_line(robot, tmp_path, data):
 @given(data=st.data())
 @QUICK
 def test_another_text_is_one_line(tmp_path, data):
-    text = TEXTS["ridgeback_ur10"].encode()
-    first, last = sorted(data.draw(st.integers(0, len(text))) for _ in range(2))
     path = tmp_path / "robot.toml"
-    path.write_bytes(text[:first] + data.draw(st.binary(max_size=8)) + text[min(last, first + 40) :])
+    path.write_bytes(spoilt(TEXTS["ridgeback_ur10"], data, 40))
     one_line_or_a_robot(path)
 
 

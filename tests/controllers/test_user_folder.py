@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.user_folder import user_folder
 
 
@@ -20,3 +21,6 @@ def test_only_an_absolute_folder_replaces_the_default(variable, tmp_path, monkey
     monkeypatch.delenv(variable)
     assert user_folder(variable) == usual
     assert not list(Path(tmp_path).iterdir())
+    monkeypatch.setattr("os.path.expanduser", str)  # as where nobody knows a home
+    with pytest.raises(HandrailError, match=f"{variable}: expected an absolute folder"):
+        user_folder(variable)

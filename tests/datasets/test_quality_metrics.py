@@ -211,9 +211,10 @@ def test_effort():
     assert steered(effort.input_reversals, inputs, scale) == 0.0
 
 
-def test_axes_not_owned_are_no_input_where_the_mask_has_the_grippers_too():
-    inputs, owned = np.ones((20, 2)), np.tile([True, False, True], (20, 1))
-    assert value(effort.active_axes, {"input_scale": np.ones(2)}, asked=inputs, owned=owned) == 1.0
+@pytest.mark.parametrize("part", [{"owned": [True, False, True]}, {"owner": [2, 1, 2]}])
+def test_axes_not_owned_are_no_input_where_the_mask_has_the_grippers_too(part):
+    rows = {name: np.tile(row, (20, 1)) for name, row in part.items()}
+    assert value(effort.active_axes, {"input_scale": np.ones(2)}, asked=np.ones((20, 2)), **rows) == 1.0
 
 
 def test_reversals_pass_over_the_dead_band():

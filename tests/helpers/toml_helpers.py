@@ -68,3 +68,9 @@ def mutated(text: str, data: st.DataObject) -> str:
             changed(content, data.draw(st.sampled_from(there)), data.draw(JUNK), data.draw(st.booleans()))
     content |= data.draw(st.dictionaries(st.text(min_size=1, max_size=3), JUNK, max_size=1))
     return "\n".join(f"{toml(key)} = {toml(value)}" for key, value in content.items())
+
+
+def spoilt(text: str, data: st.DataObject, most: int) -> bytes:
+    """Return a file of which at most so many bytes somewhere are others."""
+    first, last = sorted(data.draw(st.integers(0, len(text.encode()))) for _ in range(2))
+    return text.encode()[:first] + data.draw(st.binary(max_size=8)) + text.encode()[min(last, first + most) :]

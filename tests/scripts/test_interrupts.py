@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from canned import canned, record_by_command
 
+from handrail.scripts.bench.soak.child import session
 from handrail.scripts.commands import COMMANDS
 
 OURS, BENCH = ("-m", "handrail.scripts"), ("-m", "handrail.scripts.bench")
@@ -56,19 +57,6 @@ def begun(*words: str, **options) -> subprocess.Popen:
 def hears(pid: int) -> bool:
     caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
     return caught is not None and bool(int(caught[1], 16) >> (signal.SIGTERM - 1) & 1)
-
-
-def session(pid: int) -> list[int]:
-    """Return the processes of a session that live."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, *fields = place.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[2]) == pid and state != "Z":
-            found.append(int(place.parent.name))
-    return found
 
 
 def ended(process: subprocess.Popen, number: int, done: tuple[int, ...] = ()) -> str | None:

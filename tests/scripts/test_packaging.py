@@ -139,5 +139,5 @@ def test_setup_brings_pip_to_an_environment_without(setup, tmp_path):
 def test_setup_says_what_to_do_without_python(setup, tmp_path):
     done = setup(str(tmp_path / "bin" / "python3.12"))
     assert done.returncode == 1
-    assert "does not run, is older than 3.12, or lacks venv" in done.stderr
+    assert "does not run, is not 3.12 or 3.13, or lacks venv" in done.stderr
     assert not (tmp_path / ".venv").exists()

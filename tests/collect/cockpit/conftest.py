@@ -3,7 +3,7 @@
 from contextlib import ExitStack
 
 import pytest
-from cockpit_helpers import server, stage
+from cockpit_helpers import connected, server, stage
 
 
 @pytest.fixture(scope="module")
@@ -12,6 +12,14 @@ def served():
     with server() as made:
         stage(made)
         yield made
+
+
+@pytest.fixture
+def ends():
+    both = connected()
+    yield both
+    for each in both:
+        each.close()
 
 
 @pytest.fixture

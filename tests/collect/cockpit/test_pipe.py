@@ -1,18 +1,9 @@
 """Laws: what is said once gets through a full pipe, in order and whole; the rest is dropped and counted."""
 
 import pytest
-from cockpit_helpers import connected
 
 from handrail.collect.cockpit.pipe import LARGEST, Kind
 from handrail.controllers.errors import HandrailError
-
-
-@pytest.fixture
-def ends():
-    both = connected()
-    yield both
-    for each in both:
-        each.close()
 
 
 def fill(pipe, kind=Kind.DRIVE):

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import msgspec
 import numpy as np
 import pytest
-from cockpit_helpers import ask_for, connected, drive, page, seen, server, show, stage, told
+from cockpit_helpers import ask_for, drive, page, seen, server, show, stage, told
 
 from handrail.collect.cockpit.hub import Hub
 from handrail.collect.cockpit.pipe import Kind
@@ -45,14 +45,6 @@ class QueuedSocket:
 
     async def close(self, code=1000):
         self.closed = code
-
-
-@pytest.fixture
-def ends():
-    both = connected()
-    yield both
-    for each in both:
-        each.close()
 
 
 @pytest.fixture

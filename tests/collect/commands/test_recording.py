@@ -4,7 +4,9 @@ import shutil
 from dataclasses import replace
 
 import pytest
+from canned import copied
 from command_helpers import ran, refused
+from datasets_helpers import record as make_dataset
 
 from handrail.collect.commands.account import next_commands
 from handrail.collect.commands.record import record
@@ -116,6 +118,12 @@ def test_files_beside_a_dataset_without_episodes_stay(tmp_path):
     assert list(tmp_path.rglob("*")) == [tmp_path / "mine", tmp_path / "mine" / "notes.txt"]
 
 
+def test_a_demo_removes_no_more_episodes_than_a_demo_has(tmp_path):
+    root = copied(tmp_path / "dataset", make_dataset, episodes=2)
+    refused(tmp_path, "--overwrite", "--episodes", 1, name="demo", told="2 episodes, more than a demo has")
+    assert len(read_episodes(root)) == 2
+
+
 def test_where_nothing_can_be_written_it_says_so(tmp_path):
     (tmp_path / "outputs").write_text("a file")
     with pytest.raises(HandrailError, match="is a file"):
@@ -127,7 +135,7 @@ def test_a_robot_s_file_has_a_name_of_its_own(tmp_path):
     own, mine = ROBOTS.find("ridgeback_ur10").file, tmp_path / "mine.toml"
     shutil.copy(own, mine)
     flags = ("--task", "reach", "--time_limit", "0.2", "--no_physics", "--dataset.num_episodes", 1)
-    refused(tmp_path / "set", *flags, "--robot", mine, told="expected a name of its own in that file, got")
+    refused(tmp_path / "set", *flags, "--robot", mine, told="expected a name of its own, got")
     assert not (tmp_path / "set").exists()
     ran(tmp_path / "set", *flags, "--robot", own)
     mine = tmp_path / "other.toml"

@@ -75,23 +75,30 @@ def test_a_person_at_a_page_drives_and_takes_the_next_scene(robot, tmp_path):
         teleop.disconnect()
 
 
-def test_a_person_with_a_gamepad_drives(robot, pad, tmp_path):
+@pytest.mark.parametrize(
+    ("settings", "channel", "least"),
+    [({}, "ee.x.vel", 0.1), ({"robot": "bi_so101", "task": "reach", "hand": "right"}, "right.x.vel", 0.02)],
+)
+def test_a_person_with_a_gamepad_drives(settings, channel, least, pad, tmp_path):
+    """The hand of the action, whichever is chosen."""
+    robot = HandrailSim(HandrailSimConfig(calibration_dir=tmp_path, **settings))
     teleop = HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))
     teleop.connect()
     robot.connect()
     try:
         assert until(robot, teleop, lambda action: HOLD in action)
-        for control in ("left_shoulder", "start"):
+        for control in (*["a"] * bool(settings), "left_shoulder", "start"):  # `a` is the other hand
             pad.move(control, 1)
         until(robot, teleop, lambda action: HOLD not in action)
         pad.move("left_y", -1.0)
-        until(robot, teleop, lambda action: abs(action["ee.x.vel"]) > 0.1)
+        until(robot, teleop, lambda action: abs(action[channel]) > least)
         pad.move("left_shoulder", 0)
         until(robot, teleop, lambda action: HOLD in action)
         pad.move("y", 1)
         until(robot, teleop, lambda action: NEXT in action)
     finally:
         teleop.disconnect()
+        robot.disconnect()
 
 
 def test_lerobot_s_keys_are_lerobot_s_alone(robot, monkeypatch, tmp_path):
@@ -115,22 +122,3 @@ def test_nobody_chooses_a_frame_that_an_action_cannot_say(task, more, pad, tmp_p
     made.close()
     assert chosen == {"base", "world", *more}
     assert ("not steered in the tool's frame" in capsys.readouterr().out) is (not more)
-
-
-def test_a_gamepad_steers_the_hand_of_the_action_whichever_is_chosen(pad, tmp_path):
-    robot = HandrailSim(
-        HandrailSimConfig(robot="bi_so101", task="reach", hand="right", calibration_dir=tmp_path)
-    )
-    teleop = HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))
-    teleop.connect()
-    robot.connect()
-    try:
-        assert until(robot, teleop, lambda action: HOLD in action)
-        for control in ("a", "left_shoulder", "start"):  # `a` is the other hand
-            pad.move(control, 1)
-        until(robot, teleop, lambda action: HOLD not in action)
-        pad.move("left_y", -1.0)
-        until(robot, teleop, lambda action: abs(action["right.x.vel"]) > 0.02)
-    finally:
-        teleop.disconnect()
-        robot.disconnect()

@@ -177,10 +177,12 @@ def test_a_robot_in_other_units_is_refused_before_it_moves(scale):
         WholeBody(arm, units, 0.05).observe(said, 0.0)
 
 
-@pytest.mark.parametrize("refused", [{"d": math.nan}, {"d": 0.1, "time": -1.0}, {"d": 0.1, "typo": 0.1}])
+@pytest.mark.parametrize("refused", [{"d": math.nan}, {"time": -1.0}, {"time": 0.15}, {"typo": 0.1}])
 def test_the_gripper_of_an_action_that_is_refused_is_forgotten(refused):
     drive = Drive(inputs={"d": ["ee.vx", 0.05]})
     opened = drive.go({"d": 0.1}, 0.5)["gripper.pos"]
-    drive.go(refused | {"gripper": 1.0}, 0.5)
+    for _ in range(15):
+        stamp = drive.clock.now + refused.get("time", 0.0)
+        drive.go({"d": 0.1, "gripper": 1.0} | refused | {"time": stamp})
     assert drive.go({"d": 0.1}, 1.0)["gripper.pos"] == pytest.approx(opened)
     assert drive.go({"d": 0.1, "gripper": 1.0}, 1.0)["gripper.pos"] != pytest.approx(opened, abs=0.1)

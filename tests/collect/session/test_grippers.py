@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arbiter_helpers import Fake, arbiter, asks
+from collect_helpers import Watcher
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.person.inputs import Ask, Input
@@ -41,14 +42,6 @@ class Page:
         axes = tuple(float(name == what) for name in self._names)
         self.person.take(Input(True, "keyboard", (self._grips,), axes, 0.0, ()), 0.0)
         return self._operator.act(view)
-
-
-class Watcher:
-    def begin(self, env, seed):
-        self.frames = []
-
-    def see(self, frame):
-        self.frames.append(frame)
 
 
 def driven(task, plan, shared=False, **asked):

@@ -1,5 +1,7 @@
 """`handrail-replay --video`: the whole episode, or one line."""
 
+from pathlib import Path
+
 import av
 import numpy as np
 import pytest
@@ -15,11 +17,13 @@ def recorded():
 
 
 @pytest.mark.needs_gl
-def test_a_replay_is_filmed_from_beginning_to_end(recorded, tmp_path):
-    film = tmp_path / "episode.mp4"
+def test_a_replay_is_filmed_from_beginning_to_end(recorded, tmp_path, monkeypatch):
+    """Also into a file whose name FFmpeg would read as the address of something."""
+    monkeypatch.chdir(tmp_path)
+    film = Path("17:28.mp4")
     done = command(recorded, "--episode", 0, "--video", film, name="replay")
     assert (done.returncode, done.stdout.count(str(film))) == (0, 1), done.stderr
-    with av.open(str(film)) as container:
+    with av.open(str(film.absolute())) as container:
         pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
         assert container.streams.video[0].average_rate == read_info(recorded).fps
     assert len(pictures) == read_episodes(recorded)[0]["length"]

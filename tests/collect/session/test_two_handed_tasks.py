@@ -5,6 +5,7 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from collect_helpers import Watcher
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -19,14 +20,6 @@ ROBOT = "tiago_pro"
 
 
 SPEED = 0.08  # of the base [m/s]
-
-
-class Watcher:
-    def begin(self, env, seed):
-        self.frames = []
-
-    def see(self, frame):
-        self.frames.append(frame)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from collect_helpers import Watcher
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -21,14 +22,6 @@ from handrail.controllers.robot.model import load_model
 
 ROBOT = "tiago_pro"
 TOOLS = ("left.tool", "right.tool")
-
-
-class Watcher:
-    def begin(self, env, seed):
-        self.frames = []
-
-    def see(self, frame):
-        self.frames.append(frame)
 
 
 @pytest.mark.parametrize("hand", ["left", "right"])

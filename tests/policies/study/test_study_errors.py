@@ -9,7 +9,7 @@ from command_helpers import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from study_helpers import DESIGN, Starter, run_here
-from toml_helpers import mutated
+from toml_helpers import mutated, spoilt
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.storage.lock import FolderLock
@@ -199,10 +199,8 @@ def test_an_entry_of_another_kind_is_one_line(tmp_path, data):
 @given(data=st.data())
 @QUICK
 def test_another_text_is_one_line(tmp_path, data):
-    text = DESIGN.encode()
-    first, last = sorted(data.draw(st.integers(0, len(text))) for _ in range(2))
     path = tmp_path / "study.toml"
-    path.write_bytes(text[:first] + data.draw(st.binary(max_size=8)) + text[min(last, first + 20) :])
+    path.write_bytes(spoilt(DESIGN, data, 20))
     one_line_or_a_design(path)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from collect_helpers import Watcher
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -165,21 +166,14 @@ class Switching:
 @pytest.mark.parametrize("mode", ["ee", "ee_dls"])
 def test_the_other_hand_takes_over_without_a_jolt(mode):
     """What is sent stays within the limits of acceleration; both hands move, and nothing brakes."""
-    frames = []
-
-    class Watcher:
-        def begin(self, env, seed): ...
-        def see(self, frame):
-            frames.append(frame)
-
     config = SessionConfig(task="reach", mode=mode, robot="tiago_pro", physics=False)
     env = build_env(config, 20)
-    session = build_session(config, env, (Watcher(),), person=Switching(env, mode))
+    session = build_session(config, env, (watcher := Watcher(),), person=Switching(env, mode))
     replace(session, realtime=False).run(0)
-    sent = np.array([frame.action[:-2] for frame in frames])
+    sent = np.array([frame.action[:-2] for frame in watcher.frames])
     limits = MODEL.description.limits
     assert np.all(np.abs(np.diff(sent, axis=0, prepend=0.0)) <= PERIOD * limits.acceleration * 1.0001)
-    steered = [frame for frame in frames if frame.intent.mask.any()]
+    steered = [frame for frame in watcher.frames if frame.intent.mask.any()]
     assert len({frame.intent.mask.tobytes() for frame in steered}) == 2
     assert not any(frame.diagnostics.status.brakes for frame in steered)
     for hand in range(2):
