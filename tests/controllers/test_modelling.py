@@ -11,7 +11,7 @@ import pytest
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.modelling.checks import faults
-from handrail.controllers.modelling.clouds import hull, link_clouds
+from handrail.controllers.modelling.clouds import link_clouds
 from handrail.controllers.modelling.home import freedom
 from handrail.controllers.modelling.making import RobotMaker
 from handrail.controllers.modelling.pairs import outside
@@ -298,7 +298,3 @@ def test_a_srdf_leaves_out_what_never_meets_the_body_of_the_hand(tmp_path):
     pairs = one_made(tmp_path, one_arm(NAMES, {})).model().description.self_pairs
     assert ("l3", "l6") in pairs
     assert ("l4", "l6") not in pairs
-
-
-def test_a_hull_of_few_points_is_these_points():
-    assert hull(np.eye(3)).tolist() == np.eye(3).tolist()

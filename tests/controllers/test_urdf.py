@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.modelling.clouds import link_clouds
+from handrail.controllers.modelling.clouds import hull, link_clouds
 from handrail.controllers.modelling.limits import arm_limits
 from handrail.controllers.modelling.making import RobotMaker
 from handrail.controllers.modelling.source import Source
@@ -122,3 +122,7 @@ def test_joints_that_stand_still_stand_where_they_can(tmp_path):
     for on, out in ((l6.actInv(led), 0.1), (led.actInv(follow), 0.03 - 2.0 * 0.1)):
         there = origin * pin.SE3(np.eye(3), np.array([0.0, 0.0, out]))
         np.testing.assert_allclose(on.homogeneous, there.homogeneous, atol=1e-12)
+
+
+def test_a_hull_of_few_points_is_these_points():
+    assert hull(np.eye(3)).tolist() == np.eye(3).tolist()
