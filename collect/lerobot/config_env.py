@@ -36,7 +36,7 @@ class HandrailEnvConfig(SimulatedConfig, EnvConfig):
     render_size: int = 128
     """Height and width of the films that LeRobot makes of the first episodes [px]."""
     time_limit: float = 0.0
-    """Time after which an episode is given up [s]; the task's own when 0."""
+    """Time after which an episode has failed [s]; the task's own when 0."""
     first_seed: int = FIRST_SEED
     """Added to LeRobot's `--seed`: by default the episodes are `handrail-evaluate`'s, none of a recording."""
     features_map: dict[str, str] = field(

@@ -23,6 +23,7 @@ from handrail.controllers.registry import resolved
 from handrail.controllers.robot.description import SCENE_CAMERA
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
+from handrail.controllers.typed import Positive, check
 
 Observation = dict[str, Any]
 RENDER_SIZE = (480, 640)  # height, width [px]
@@ -85,7 +86,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         check_known("camera", self.cameras, self.model.description.camera_names)
         self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
-        self._max_episode_steps = math.ceil(self.task.time_limit * fps - 1e-6)
+        seconds = check(self.task.time_limit, Positive, "time_limit of the task")
+        self._max_episode_steps = math.ceil(seconds * fps - 1e-6)
         self._build, self._looks = plant, looks
         self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)

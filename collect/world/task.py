@@ -129,7 +129,7 @@ class Task(ABC):
     """A task: a frozen dataclass in its own file, with one entry in `collect/world/tasks/catalogue.py`."""
 
     description: str  # one sentence: what to do; LeRobot's `task` string
-    time_limit: float  # time after which an episode is given up [s]
+    time_limit: float  # time after which an episode has failed [s]
     stages: ClassVar[tuple[str, ...]] = ()
     """Names of the stages in which it is done, one after the other, if it has any."""
     parts: ClassVar[Mapping[str, str]] = {}

@@ -1,9 +1,9 @@
 """How much work steering was: what the operator put in, by axis, and what only a person's device records.
 
-The input is the velocity that the operator asked for on each axis, beside a policy that of the person. A hand's
-axes are the world's, whatever axes a person steers along: with a tool that turns, the axis changes. The scale
-is the largest value of each axis in all datasets that are compared: 1 is full deflection; an axis that was
-never used does not count.
+The input is the velocity that the operator asked for on each axis, beside a policy that of the person. A
+hand's axes are the world's, whatever axes a person steers along: with a tool that turns, the axis changes.
+The scale is the largest value of each axis in all datasets that are compared: 1 is full deflection; an axis
+that was never used does not count.
 Measures: Herlant et al. 2016, "Assistive teleoperation of robot arms via automatic time-optimal mode
 switching", for mode switches; the others are common in teleoperation.
 """

@@ -129,6 +129,12 @@ def test_a_task_that_cannot_be_imported_is_one_line(wrong):
         HandrailEnv(wrong)
 
 
+@pytest.mark.parametrize("limit", [np.inf, np.nan, 0.0])
+def test_a_task_that_would_never_end_or_begin_is_one_line(limit):
+    with pytest.raises(HandrailError, match="time_limit of the task: expected"):
+        HandrailEnv(Reach(time_limit=limit))
+
+
 @pytest.mark.parametrize("features", [np.zeros(4), np.zeros((1, 7)), [0.0, np.nan, *[0.0] * 5], [np.inf] * 7])
 def test_features_that_are_not_as_many_finite_numbers_are_refused_in_one_line(monkeypatch, features):
     monkeypatch.setattr(Reach, "features", lambda task, state: features)
