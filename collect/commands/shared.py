@@ -154,9 +154,7 @@ def _slices(job: Job, manifest: Manifest) -> Iterator[EpisodeSlice]:
     rows = map(EpisodeRows.read, row_files(layout))
     records = list(chain.from_iterable(each.records(with_stats=True) for each in rows))
     if len(records) != job.size:
-        raise HandrailError(
-            f"dataset {str(layout.root)!r}: expected {job.size} episodes, found {len(records)}"
-        )
+        raise HandrailError(f"dataset {str(layout.root)!r}: expected {job.size} episodes, got {len(records)}")
     yield from (EpisodeSlice.of(layout, manifest, record) for record in records)
 
 

@@ -18,6 +18,7 @@ BUTTONS = (
 CONTROLS = (*AXES, *BUTTONS)
 _FULL = 32767.0
 _PERIOD = 0.008  # between two looks [s]
+_DOWN = (0.2, 0.05)  # of its way a trigger is beyond when it goes down, and until it is let go
 _HEADLESS = {  # no window, no sound, and events also while another window has the focus
     "SDL_VIDEODRIVER": "dummy",
     "SDL_AUDIODRIVER": "dummy",
@@ -62,7 +63,8 @@ class Gamepad:
         sticks = {name: self._shape(self._pad.get_axis(index) / _FULL) for index, name in enumerate(AXES)}
         buttons = {name: 1.0 for index, name in enumerate(BUTTONS) if self._pad.get_button(index)}
         held = {name: value for name, value in sticks.items() if value} | buttons
-        before, self._down = self._down, frozenset(held)
+        before = self._down
+        self._down = frozenset(name for name, value in held.items() if abs(value) > _DOWN[name in before])
         presses = tuple(name for name in CONTROLS if name in self._down - before)
         return DeviceInput(self._clock(), held, presses)
 

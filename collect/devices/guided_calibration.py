@@ -22,7 +22,7 @@ from handrail.datasets.presentation.terminal import Terminal
 
 SKIP = "-"
 _UNITS = {"degrees": math.pi / 180.0, "radians": 1.0}
-_LEAST = 0.25  # of a quarter turn, to count as one was asked for
+_LEAST = 0.25  # of a quarter turn, to count as one; of a leader without a unit a degree is one of its steps
 _CLEAR = 0.5  # the second largest change over the largest one, at most
 _LEAST_HANDLE = 0.08  # change of a handle [rad]; of one without a unit a degree is one of its steps
 
@@ -87,7 +87,8 @@ class _Guide:
                 return None
             source, change = self._moved(before)
             scale = _UNITS.get(self._unit, 0.5 * math.pi / max(abs(change), 1e-9))
-            if source and abs(change * scale) >= _LEAST * 0.5 * math.pi:
+            turn = abs(change) * _UNITS.get(self._unit, _UNITS["degrees"])
+            if source and turn >= _LEAST * 0.5 * math.pi:
                 self._taken.add(source)
                 return LeaderJoint(source, math.copysign(scale, change))
             Terminal().print(

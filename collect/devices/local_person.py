@@ -61,6 +61,7 @@ class LocalPerson:
         main: the device that the operator is named after.
         beside: another one, such as the terminal's keys.
         follower: of a leader arm, which is then the main device; the other one has the clutch and the base.
+        shared: whether a policy moves the grippers too.
 
     Attributes:
         person: who steers.
@@ -72,8 +73,9 @@ class LocalPerson:
         main: DeviceReader,
         beside: DeviceReader | None = None,
         follower: Follower | None = None,
+        shared: bool = False,
     ) -> None:
-        self.person, self._main, self._follower = person, main, follower
+        self.person, self._main, self._follower, self._shared = person, main, follower, shared
         self._sources = [main, beside] if beside else [main]
         self._moving = self._sources[-1] if follower else main  # the one with the dead-man
         self._card = Card(person, main.device.name, [source.controls for source in self._sources])
@@ -96,7 +98,7 @@ class LocalPerson:
         """Return the intent now, or what becomes of the episode."""
         self._take(*self._heard(), view)
         answer, card = self.person.act(view), self._card
-        card.view, card.moves, card.grips = view, self._moving.moves(self._steered), tuple(self.person.closed)
+        card.view, card.moves, card.grips = view, self._moving.moves(self._steered), self._closed(view)
         return answer
 
     def between(self) -> EpisodeEvent | None:
@@ -157,8 +159,8 @@ class LocalPerson:
             clutch = on and CLUTCH in other.deflections
             targets = self._follower.targets(main.joints, clutch, view.state.q)
             before, self._handle = self._handle, self._follower.grips(main.joints, bool(self._handle))
-            if before not in (None, self._handle):
-                self.person.grip(0, self._handle)
+            if before not in (None, self._handle) and self._handle != (self._closed(view)[0] > 0.5):
+                self.person.grip(0)
             self._card.apart = self._follower.apart(main.joints, view.state.q)
         else:
             on = on and HOLD in main.deflections
@@ -171,6 +173,10 @@ class LocalPerson:
         axes = tuple(float(np.clip(said.get(name, 0.0), -1.0, 1.0)) for name in names)
         inputs = Input(on, self._main.device.name, (False,) * len(self.person.closed), axes, 0.0, targets)
         self.person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
+
+    def _closed(self, view: View) -> tuple[float, ...]:
+        """Return how far each gripper shall be closed: beside a policy as was sent, which may be its wish."""
+        return view.grippers if self._shared and view.grippers else tuple(self.person.closed)
 
     def _do(self, action: str) -> None:
         """Do what a control asks for."""

@@ -112,7 +112,7 @@ def _person(
             stack.callback(reader.close)
             reader.start()
         stack.pop_all()
-    return LocalPerson(person, main, beside, follower)
+    return LocalPerson(person, main, beside, follower, bool(config.policy))
 
 
 def _led(modes: Mapping[str, TeleopMode], env: HandrailEnv, first: str) -> dict[str, TeleopMode]:

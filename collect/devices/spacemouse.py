@@ -50,7 +50,7 @@ class SpaceMouse:
         """Find a SpaceMouse."""
         hid, found = _plugged()
         if len(found) <= self._number:
-            raise HandrailError("SpaceMouse: expected one, found none; plug it in, then try again")
+            raise HandrailError(f"SpaceMouse: expected one{' more' * self._number}, found none; plug it in")
         self._axes: dict[str, float] = dict.fromkeys(AXES, 0.0)
         self._down: frozenset[str] = frozenset()
         self._heard = 0.0
@@ -118,8 +118,8 @@ class SpaceMice:
         self._open = self._caps[:1]
 
     def open(self) -> None:
-        """Find one or two, in the order of their addresses."""
-        self._open = self._caps[: max(1, len(_plugged()[1]))]
+        """Find one or two, in the order of their addresses; two stay two, or one would steer another hand."""
+        self._open = self._caps[: max(len(self._open), len(_plugged()[1]))]
         for cap in self._open:
             cap.open()
 

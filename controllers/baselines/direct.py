@@ -23,6 +23,7 @@ class DirectController(ReactiveController):
 
     def __init__(self, model: RobotModel, period: float = 0.05) -> None:
         super().__init__(model, self._commanded, period)
+        self._foreign[self.channels.hands_slice] = True
 
     def _commanded(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         joints = self.channels.joint_slice

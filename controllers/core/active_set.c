@@ -76,7 +76,7 @@ WIDE static double project(Core *c, int64_t count) {
       add(c->normal, -share, c->directions + i * c->V, c->V);
     }
     square = dot(c->normal, c->normal, c->V);
-    if (square > CANCELLED * before || square < 1e-30 * whole) break;
+    if (!(square <= CANCELLED * before && square >= 1e-30 * whole)) break; /* also of NaN */
     before = square;
   }
   memcpy(c->shares, c->coordinates, count * sizeof(double));

@@ -41,9 +41,7 @@ class _Address:
         if isinstance(value, np.ndarray):
             flags = value.flags
             if not (flags.c_contiguous and value.dtype.char in "dl"):
-                raise TypeError(
-                    f"core: expected an array of float64 or int64 in one piece, got {value.dtype}"
-                )
+                raise TypeError(f"core: expected float64 or int64 in one piece, got {value.dtype}")
             if flags.writeable:  # takes a third of the time
                 return ctypes.byref(_NOTHING.from_buffer(value))
             return ctypes.c_void_p(value.ctypes.data)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import casadi as ca
 
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.first_use import compiling
 from handrail.controllers.user_folder import user_folder
 
@@ -35,7 +36,7 @@ def compiled(function: ca.Function) -> ca.Function:
         if not library.is_file():
             _build(source, library, compiler)
         return ca.external(function.name(), str(library))
-    except (OSError, RuntimeError, subprocess.SubprocessError):
+    except (HandrailError, OSError, RuntimeError, subprocess.SubprocessError):
         return function  # a compiler that fails costs speed, nothing else
 
 

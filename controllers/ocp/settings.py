@@ -17,7 +17,7 @@ _LENGTHS = ("margin", "work_margin", "activation_distance", "largest_speed", "le
 class MpcSettings:
     """Settings of the masked MPC; weights are per squared unit of their residual."""
 
-    horizon: Annotated[int, Meta(ge=1)] = 10  # stages N
+    horizon: Annotated[int, Meta(ge=1, le=100)] = 10  # stages N
     dt: Positive = 0.1  # length of a stage [s]
     decay: Annotated[float, Meta(gt=0, le=1)] = 0.9  # γ; stage k tracks the intent with weight γᵏ
     tracked_stages: Count = 0  # stages M at which the intent is tracked; 0 for all
@@ -35,7 +35,7 @@ class MpcSettings:
     activation_distance: NonNegative = 0.15
     """Distance beyond the margin at which a pair enters the problem [m]."""
     slack_linear: NonNegative = 1e6  # linear penalty of the slack
-    slack_quadratic: NonNegative = 1e6  # quadratic penalty of the slack
+    slack_quadratic: Positive = 1e6  # quadratic penalty of the slack
     largest_speed: NonNegative = 2.0
     """Speed above which a commanded translation of the tool is taken as this [m/s]."""
     largest_rate: NonNegative = 4.0  # the same for its rotation [rad/s]

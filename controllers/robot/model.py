@@ -176,9 +176,7 @@ def _build(description: RobotDescription) -> pin.Model:
         model = pin.appendModel(model, own, model.getFrameId(arm.on), _se3(arm.mount))
     if tuple(model.names[1:]) != description.joints:
         expected, got = (", ".join(names) for names in (list(model.names)[1:], description.joints))
-        raise HandrailError(
-            f"joints of robot {description.name}: expected in the order {expected}; got {got}"
-        )
+        raise HandrailError(f"joints of robot {description.name}: expected the order {expected}, got {got}")
     for hand in description.hands:
         _add_tool(model, hand, description.name)
     _check_hands(model, description)

@@ -11,7 +11,7 @@ from handrail.controllers.errors import HandrailError, shown
 ShapeKind = Literal["box", "capsule", "sphere", "cylinder"]
 
 _SIZES = {"box": 3, "capsule": 2, "sphere": 1, "cylinder": 2}
-_LARGEST = 1e100  # of a length [m]: its square is a number
+_LARGEST = 1e6  # of a length [m]: distances are still numbers
 _ROTATION_ERROR = 1e-5  # of a matrix that still is a rotation; float32 has about 1e-7
 
 

@@ -12,7 +12,7 @@ from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.safety.certificate import Certificate, Violation
 from handrail.controllers.safety.limiter import Limiter
 
-_SAME = 1e-6  # difference of velocities that is rounding [m/s, rad/s]
+_SAME = 0.01  # time by which the clock of a robot may be off [s]
 
 
 class Situation(NamedTuple):
@@ -38,7 +38,8 @@ class Backup(NamedTuple):
 
     1. The new plan's first stage and a full stop from its end.
     2. The whole new plan and a full stop from its end; or as far as that is safe, half as far, and so on.
-    3. The plan that it follows already; only if its velocity is that plan's: not when it was held back.
+    3. The plan that it follows already; only if its velocity is that plan's now, or within 10 ms: a clock may
+       be off by that. Not when it was held back.
     4. A full stop at once.
 
     An operator who is gone or talks nonsense has no plan, and wants 4 before 3. Where no way is safe,
@@ -73,7 +74,8 @@ class Backup(NamedTuple):
             yield self._way(situation, full_stop(self.limiter, situation.v, self.dt))
         if situation.followed is not None:
             followed = situation.followed.after(situation.elapsed)
-            if np.allclose(situation.v, followed.velocity(0.0), rtol=0.0, atol=_SAME):
+            off = _SAME * self.limiter.limits.acceleration
+            if np.allclose(situation.v, followed.velocity(0.0), rtol=0.0, atol=off):
                 yield self._way(situation, followed)
         if not halt:
             yield self._way(situation, full_stop(self.limiter, situation.v, self.dt))

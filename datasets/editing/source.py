@@ -104,9 +104,7 @@ def opened(roots: Sequence[Path], target: Path, verify: bool = False) -> Iterato
             )
         if target not in roots:
             if target.exists() and (not target.is_dir() or any(target.iterdir())):
-                raise HandrailError(
-                    f"--output {target}: expected a missing or empty folder, found one in use"
-                )
+                raise HandrailError(f"--output {target}: expected a missing or empty folder, got one in use")
             yield [EditSource.open(root, verify) for root in roots]
             return
         EditSource.open(target)

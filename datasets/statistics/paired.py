@@ -38,9 +38,7 @@ def paired_difference(first: FloatArray, second: FloatArray, rng: np.random.Gene
     """Compare a measure of the same trials, `(N,)` each; pairs that are not finite are left out."""
     first, second = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if first.shape != second.shape or first.ndim != 1:
-        raise HandrailError(
-            f"paired difference: expected two equal sizes, got {first.size} and {second.size}"
-        )
+        raise HandrailError(f"paired difference: expected equal sizes, got {first.size} and {second.size}")
     differences = (first - second)[np.isfinite(first) & np.isfinite(second)]
     if len(differences) < 2:
         raise HandrailError(f"paired difference: expected two pairs or more, got {len(differences)}")
@@ -55,7 +53,7 @@ def paired_success(first: FloatArray, second: FloatArray) -> PairedSuccess:
     """Compare success (0 or 1) of the same trials under two conditions, (N,) each."""
     one, other = np.asarray(first, dtype=bool), np.asarray(second, dtype=bool)
     if one.shape != other.shape or not len(one):
-        raise HandrailError(f"paired success: expected two equal sizes, got {one.size} and {other.size}")
+        raise HandrailError(f"paired success: expected equal sizes, got {one.size} and {other.size}")
     only_first, only_second = int(np.sum(one & ~other)), int(np.sum(~one & other))
     discordant = only_first + only_second
     p = float(stats.binomtest(only_first, discordant, 0.5).pvalue) if discordant else 1.0

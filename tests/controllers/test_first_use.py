@@ -29,14 +29,17 @@ def test_a_library_of_casadi_is_told_and_one_in_the_cache_is_not(told, tmp_path,
     assert told == ["compiling"]
 
 
-@pytest.mark.parametrize("missing", ["compiler", "wish", "compiler that works"])
+@pytest.mark.parametrize("missing", ["compiler", "wish", "compiler that works", "home"])
 def test_without_a_compiler_the_numbers_are_the_same(told, tmp_path, monkeypatch, missing):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("HANDRAIL_COMPILE", raising=False)
     x = ca.SX.sym("x", 3)
     function = ca.Function("tangled", [x], [ca.sin(x[0]) * x[1] / (1.0 + x[2] ** 2) + ca.exp(x)])
     fast = compiled(function)
-    if missing == "wish":
+    if missing == "home":
+        monkeypatch.delenv("XDG_CACHE_HOME")
+        monkeypatch.setattr("os.path.expanduser", str)
+    elif missing == "wish":
         monkeypatch.setenv("HANDRAIL_COMPILE", "0")
     else:
         monkeypatch.setenv("PATH", str(tmp_path))

@@ -47,11 +47,19 @@ def test_a_period_that_is_none_is_refused(build, period):
         lambda: Obstacle("wall", "box", np.zeros(3)),  # type: ignore[arg-type]
         lambda: Obstacle("wall", WALL.shape, np.array([1e200, 0.0, 0.0])),
         lambda: Shape("sphere", np.array([1e200])),
+        lambda: Shape("cylinder", np.array([1e30, 1e30])),
     ],
 )
 def test_an_invalid_part_of_an_input_is_one_line(make):
     with pytest.raises(HandrailError, match=r"^[^\n]+expected [^\n]+, got [^\n]+$"):
         make()
+
+
+def test_direct_brakes_where_a_hand_is_commanded():
+    """It completes nothing: the robot would stand, and nobody be told."""
+    asked = asking(np.eye(18)[3] * 0.1, "ee")(0.0)
+    found = DirectController(MODEL).update(State(HOME, np.zeros(9), 0.0), asked)
+    assert found.diagnostics.status is Status.INVALID_INTENT
 
 
 def test_a_single_gripper_may_be_a_number():

@@ -174,7 +174,11 @@ def test_an_over_determined_command_is_a_compromise():
 
 
 @pytest.mark.parametrize(
-    "change", [{"horizon": 0}, {"dt": 0.0}, {"decay": 1.5}, {"margin": np.nan}, {"activation_distance": -1.0}]
+    "change",
+    [
+        *({"horizon": 0}, {"horizon": 10**6}, {"dt": 0.0}, {"decay": 1.5}, {"margin": np.nan}),
+        *({"activation_distance": -1.0}, {"slack_quadratic": 0.0}),
+    ],
 )
 def test_wrong_settings_are_refused(change):
     with pytest.raises(HandrailError, match="MPC setting"):

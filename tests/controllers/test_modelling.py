@@ -143,7 +143,7 @@ WRONG = {
     "order": (
         r'"left_joint0", "left_joint1"',
         '"left_joint1", "left_joint0"',
-        "expected in the order x, y, theta, lift",
+        "expected the order x, y, theta, lift",
     ),
     "pairs": (r"pairs = \[\n(?s:.*?)\n\]", "pairs = []", "left_fingers and right_fingers can meet"),
     "fast": (r"velocity = \[1.0", "velocity = [9.0", "velocity of at most 1.5, got 9.0"),

@@ -71,9 +71,9 @@ def test_wilson():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: paired_difference(np.ones(3), np.ones(4), RNG(0)), "expected two equal sizes, got 3 and 4"),
+        (lambda: paired_difference(np.ones(3), np.ones(4), RNG(0)), "expected equal sizes, got 3 and 4"),
         (lambda: paired_difference(np.ones(1), np.ones(1), RNG(0)), "expected two pairs or more, got 1"),
-        (lambda: paired_success(np.ones(0), np.ones(0)), "expected two equal sizes, got 0 and 0"),
+        (lambda: paired_success(np.ones(0), np.ones(0)), "expected equal sizes, got 0 and 0"),
         (lambda: wilson(3, 2), "got 3 of 2"),
     ],
 )

@@ -117,9 +117,9 @@ class Person:
         if self.phase in (Phase.DRIVING, Phase.LOST):
             self.phase = Phase.PAUSED
 
-    def grip(self, hand: int, closed: bool | None = None) -> None:
-        """Close or open a gripper; by default the other of both."""
-        self.closed[hand] = float(self.closed[hand] <= 0.5 if closed is None else closed)
+    def grip(self, hand: int) -> None:
+        """Close a gripper that is open, open one that is closed."""
+        self.closed[hand] = float(self.closed[hand] <= 0.5)
 
     def ask(self, ask: Ask) -> None:
         """Do what the operator asks for; what makes no sense now is left undone."""

@@ -179,7 +179,7 @@ class LevelSwitcher:
             part.reset()
         self._level, self._moving = POLICY, False
         self._since: float | None = None
-        self._usable: float | None = None  # when the policy had an answer last [s]
+        self._asked = self._usable = -np.inf  # when both wishes came last, and the policy had an answer [s]
 
     def shares(self, wishes: Wishes) -> Shares:
         """Return 1 for whoever drives, 0 for the other."""
@@ -195,8 +195,9 @@ class LevelSwitcher:
         may = abs(wishes.time - since) >= self._dwell
         level = next(filter(None, wanted), self._level) if may else self._level
         before, self._moving = self._moving, bool(self._groups.moved(wishes.person).any())
-        if wishes.policy is not None or self._usable is None:
+        if wishes.policy is not None or wishes.time - self._asked > _GONE / 2:  # after a pause it plans anew
             self._usable = wishes.time
+        self._asked = wishes.time
         if abs(wishes.time - self._usable) > _GONE or (self._moving and not before):
             level = PERSON
         self._since = since if level == self._level else wishes.time

@@ -92,7 +92,7 @@ class SharedOperator:
         self._arbiter.reset()
         self._changed = [-np.inf] * self._hands  # when the person changed each [s]
         self._closed = list(view.grippers or [0.0] * self._hands)  # how far each is asked to be closed
-        self._level: tuple[float, ...] = ()  # of each as the person's device says
+        self._level = tuple(self._closed)  # of each as the person's device says
 
     def _makes_sense(self, intent: Intent) -> bool:
         fits = intent.values.shape == (self._channels.size,)
@@ -140,7 +140,7 @@ class SharedOperator:
 
     def _take_grippers(self, person: Intent, owned: BoolArray, time: float) -> list[bool]:
         """Do what the person says of the grippers; return which are theirs. A script means what it says."""
-        last, self._level = self._level or person.grippers, person.grippers
+        last, self._level = self._level, person.grippers
         has, device = self._groups.grippers(owned), bool(person.raw.device)
         for hand, (level, before) in enumerate(zip(person.grippers, last, strict=True)):
             if not device:

@@ -53,7 +53,7 @@ def test_faults_end_with_1(tmp_path):
     done = command(path, name="robot check")
     assert done.returncode == 1
     assert done.stdout.startswith(
-        "joints of robot lekiwi: expected in the order x, y, theta, shoulder_pan, shoulder_lift"
+        "joints of robot lekiwi: expected the order x, y, theta, shoulder_pan, shoulder_lift"
     )
     assert done.stdout.count("\n") == 1
 

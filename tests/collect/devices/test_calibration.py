@@ -95,10 +95,11 @@ def test_a_leader_in_radians_has_a_handle_too():
     assert found.joints[UR10[0]].scale == 1.0
 
 
+@pytest.mark.parametrize("unit", ["degrees", "other"])
 @pytest.mark.parametrize("turned", [{}, {"pan.pos": 9.0}, {"pan.pos": 80.0, "flex.pos": 60.0}])
-def test_an_unclear_answer_is_asked_again(turned, capsys):
+def test_an_unclear_answer_is_asked_again(turned, unit, capsys):
     hands = Hands(("", turned), *GUIDED)
-    assert run(hands).joints[UR10[0]].source == "pan.pos"
+    assert run(hands, unit).joints[UR10[0]].source == "pan.pos"
     assert sum(words.startswith(UR10[0]) for words in hands.asked) == 2
     assert "Once more" in capsys.readouterr().out
 

@@ -51,6 +51,15 @@ def test_unplugged_it_is_gone_and_says_what_to_do(pad, opened):
     assert not opened.read().deflections
 
 
+def test_a_trigger_that_trembles_is_pressed_once(pad, opened):
+    """Around its dead zone, and around where it is let go."""
+    presses = []
+    for way in (0.13, 0.11, 0.13, 1.0, 0.13, 0.18, 0.13, 0.11, 0.18, 0.0, 1.0):
+        pad.move("right_trigger", 2.0 * way - 1.0)  # as its sensor says it
+        presses += opened.read().presses
+    assert presses == ["right_trigger"] * 2
+
+
 def test_without_one_it_says_what_to_do(pad):
     pad.unplug()
     with pytest.raises(HandrailError, match="expected one, found none; plug it in"):

@@ -1,13 +1,18 @@
 """Laws of a person with a leader arm: the clutch moves the arm, the other hand the base; nothing jumps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from arbiter_helpers import Fake, arbiter, asks
 from device_players import recorded
 from driven_person import ARM, CHANNELS, LEADER, MODEL, Driven
 
 from handrail.collect.devices.follower import Follower
+from handrail.collect.devices.local_person import LocalPerson
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.operators.person.inputs import Ask
+from handrail.collect.operators.shared.shared_operator import SharedOperator
 
 CLUTCH = {"keyboard": "'", "gamepad": "right_shoulder"}
 ALL = CHANNELS.joint_slice
@@ -112,3 +117,19 @@ def test_its_handle_is_the_gripper(driven):
     for place, closed in ((55.0, 0.0), (30.0, 1.0), (55.0, 1.0), (70.0, 0.0)):
         driven.main.joints["handle.pos"] = place
         assert driven.act().grippers == (closed,)
+
+
+def test_its_handle_is_the_gripper_beside_a_policy_too(driven):
+    """Whatever the policy has done with it meanwhile."""
+    rests, grippers = asks("ee", value=0.0), (0.0,)
+    person = LocalPerson(driven.person, driven.main, driven.beside, Follower(MODEL, LEADER), shared=True)
+    shared = SharedOperator(person, policy := Fake(rests), arbiter("by_mask"), MODEL)
+    shared.reset(driven.view(), np.random.default_rng(0))
+    driven.person.ask(Ask("start"))
+    for wanted, place, closed in ((1.0, 100.0, 1.0), (1.0, 0.0, 1.0), (1.0, 100.0, 0.0), (0.0, 0.0, 1.0)):
+        policy.says = replace(rests, grippers=(wanted,))
+        driven.main.joints["handle.pos"] = place
+        for _ in range(3):
+            driven.clock.now, driven.time = driven.clock.now + 0.05, driven.time + 0.05
+            grippers = shared.act(replace(driven.view(), grippers=grippers)).grippers
+        assert grippers == (closed,)

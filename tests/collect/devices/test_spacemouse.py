@@ -5,7 +5,7 @@ import sys
 import pytest
 from device_players import HID, PlayedHid, recorded
 
-from handrail.collect.devices.spacemouse import SpaceMouse
+from handrail.collect.devices.spacemouse import SpaceMice, SpaceMouse
 from handrail.controllers.errors import HandrailError
 
 FORWARD = bytes.fromhex("010000a2fe0000")  # y = −350, and it counts backward
@@ -76,6 +76,21 @@ def test_unplugged_it_is_gone_and_says_what_to_do(played, mouse):
         mouse.read()
     with pytest.raises(HandrailError, match="expected one, found none; plug it in"):
         mouse.open()
+
+
+def test_of_two_one_that_is_unplugged_is_waited_for(played, monkeypatch):
+    """The other one would steer its hand."""
+    found, paths = played.enumerate()[1], ["3", "5"]
+    monkeypatch.setattr(played, "enumerate", lambda: [{**found, "path": each.encode()} for each in paths])
+    monkeypatch.setattr(played, "open_path", lambda path: None)
+    mice = SpaceMice()
+    for path in ("3", "5"):
+        mice.open()
+        mice.close()
+        paths.remove(path)
+        with pytest.raises(HandrailError, match="expected one more, found none; plug it in"):
+            mice.open()
+        paths.insert(path == "5", path)
 
 
 def test_a_press_before_it_was_unplugged_is_said(played, mouse):

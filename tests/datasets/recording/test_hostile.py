@@ -106,7 +106,7 @@ def test_a_special_file_is_one_line_wherever_it_lies(put, tmp_path):
                 command(copy, *(word.format(new=new) for word in words), name=verb)
                 for verb, *words in COMMANDS
             ]
-            assert not any("found one in use" in done.stderr for done in said)
+            assert not any("got one in use" in done.stderr for done in said)
             assert all(done.returncode in (0, 1, 2) for done in said)
             assert all(done.stderr.count("\n") <= 1 for done in said), said
             if name.startswith(("data", "videos", "meta/episodes")):

@@ -54,8 +54,8 @@ def test_for_any_wish_shares_are_from_0_to_1_and_owners_do_not_contradict(name, 
         if name != "blend":
             assert not np.any(groups.taken(owned) & (shares.policy > 0.0) & policy.mask)
         if wished.policy is None:
-            if "emics" in name:  # for a moment they wait for it
-                time += 1.1
+            for _ in range(3 * ("emics" in name)):  # for a moment they wait for it
+                time += 0.4
                 shares = decides.shares(replace(wished, time=time))
             moved = groups.moved(person)
             assert np.all(shares.person[moved] > 0.0)

@@ -105,6 +105,7 @@ def test_a_pause_is_no_error(name):
     course = Course(arbiter(name))
     course.go(RESTS, POLICY, 5.0, realised=POLICY.values)
     course.time += 60.0
+    course.go(RESTS, None, 0.1)  # it plans anew
     assert drives(course.go(RESTS, POLICY, 0.3)) == "policy"
 
 

@@ -204,8 +204,14 @@ def test_a_change_closes_what_is_open_and_opens_what_is_closed(held, level):
     """Whatever the device's switch stands at."""
     both = Both()
     grippers(both, RESTS, (held,), (level,))
+    grippers(both, RESTS, (held,), (level,), seconds=0.6)
     assert grippers(both, RESTS, (held,), (1.0 - level,)) == ((1.0 - held,), (PERSON,))
     assert grippers(both, RESTS, (held,), (1.0 - level,), seconds=0.6) == ((held,), (POLICY,))
+
+
+def test_a_press_before_the_beginning_counts():
+    both = Both()
+    assert grippers(both, RESTS, (0.0,), (1.0,)) == ((1.0,), (PERSON,))
 
 
 def test_each_hand_s_gripper_has_an_owner():
