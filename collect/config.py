@@ -223,9 +223,7 @@ class RecordConfig(SessionConfig, PolicyConfig, ExecutionConfig):
         self.check_policy(self.operator)
         real = self.robot_client and not self.client.simulated
         if real and not OPERATORS.find(self.operator).interactive:
-            raise HandrailError(
-                f"--operator {self.operator}: expected a person: a robot needs one to stop it"
-            )
+            raise HandrailError(f"--operator {self.operator}: expected a person, to stop the robot")
         self._check_rates()
         self._check_sharing()
         for one, other in (("resume", "overwrite"), ("display_data", "display_web")):

@@ -40,7 +40,7 @@ def demo(config: DemoConfig) -> int:
     if is_dataset(Layout(root)) and not config.overwrite:
         raise HandrailError(f"{root}: an earlier demo is there; say --overwrite, or choose another folder")
     if is_dataset(Layout(root)) and (found := read_info(root).episodes) > config.episodes:
-        raise HandrailError(f"{root}: {found} episodes, more than a demo has; choose another folder")
+        raise HandrailError(f"{root}: has {found} episodes, not {config.episodes}; choose another folder")
     dataset = DatasetConfig(repo_id=REPO_ID, root=str(root), num_episodes=config.episodes)
     console.print(f"Recording {config.episodes} episodes: the operator steers the hand, the MPC the rest …")
     code = record(RecordConfig(dataset=dataset, cameras=cameras, overwrite=config.overwrite))

@@ -174,12 +174,12 @@ def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     manifest = Manifest(
         dataset.name, dataset.fps, env.model.description.name, features, versions(*SIMULATION)
     )
-    if config.resume:
-        return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
     known = ROBOTS.get(manifest.robot_type)
     if known and config.robot.endswith(".toml") and not known.file.samefile(os.path.expanduser(config.robot)):
         words = f"expected a name of its own, got {known.name!r}: policies would drive that robot"
         raise HandrailError(f"--robot {config.robot}: {words}")
+    if config.resume:
+        return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
     return EpisodeWriter.create(dataset.folder, manifest, config.overwrite)
 
 

@@ -18,7 +18,7 @@ BUTTONS = (
 CONTROLS = (*AXES, *BUTTONS)
 _FULL = 32767.0
 _PERIOD = 0.008  # between two looks [s]
-_DOWN = (0.2, 0.05)  # of its way a trigger is beyond when it goes down, and until it is let go
+_DOWN = (0.02, 0.005)  # deflection beyond which a trigger goes down, and stays so: 21 and 16 % of its way
 _HEADLESS = {  # no window, no sound, and events also while another window has the focus
     "SDL_VIDEODRIVER": "dummy",
     "SDL_AUDIODRIVER": "dummy",

@@ -158,9 +158,12 @@ class LocalPerson:
         if self._follower:
             clutch = on and CLUTCH in other.deflections
             targets = self._follower.targets(main.joints, clutch, view.state.q)
-            before, self._handle = self._handle, self._follower.grips(main.joints, bool(self._handle))
-            if before not in (None, self._handle) and self._handle != (self._closed(view)[0] > 0.5):
+            handle, said = self._follower.grips(main.joints, bool(self._handle)), self._handle is not None
+            if said and self._shared and self.person.phase is not Phase.DRIVING:
+                handle = self._handle  # how it stands is looked at when they go on
+            if said and handle not in (self._handle, self._closed(view)[0] > 0.5):
                 self.person.grip(0)
+            self._handle = handle
             self._card.apart = self._follower.apart(main.joints, view.state.q)
         else:
             on = on and HOLD in main.deflections

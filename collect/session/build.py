@@ -71,9 +71,7 @@ def build_env(
 def build_task(config: SessionConfig) -> Task:
     """Return the task, with the time limit and the moving obstacles of the settings."""
     settings = {"time_limit": config.time_limit, "moving_obstacles": config.moving_obstacles}
-    return resolved(TASKS.find(config.task).task)(
-        **{name: value for name, value in settings.items() if value}
-    )
+    return resolved(TASKS.find(config.task).task)(**{key: value for key, value in settings.items() if value})
 
 
 def build_session(

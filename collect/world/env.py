@@ -86,7 +86,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         check_known("camera", self.cameras, self.model.description.camera_names)
         self.render_mode, self.render_size = render_mode, render_size
         self.metadata = {**type(self).metadata, "render_fps": fps}
-        seconds = check(self.task.time_limit, Positive, "time_limit of the task")
+        seconds = check(float(self.task.time_limit), Positive, "time_limit of the task")
         self._max_episode_steps = math.ceil(seconds * fps - 1e-6)
         self._build, self._looks = plant, looks
         self._sample = sample or self.task.sample

@@ -1,5 +1,6 @@
 """A robot is data: the description file that MuJoCo, pinocchio and CasADi are all built from."""
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -85,7 +86,7 @@ def robot_names() -> list[str]:
 
 def load_description(robot: str | Path) -> RobotDescription:
     """Read a robot by name, by `module:name`, or from a description file."""
-    path = Path(robot).expanduser() if str(robot).endswith(".toml") else ROBOTS.find(str(robot)).file
+    path = Path(os.path.expanduser(robot)) if str(robot).endswith(".toml") else ROBOTS.find(str(robot)).file
     if not path.is_file():
         raise HandrailError(
             f"unknown robot {str(robot)!r}: expected --robot FILE.toml or one of {', '.join(robot_names())}"

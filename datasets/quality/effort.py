@@ -1,9 +1,9 @@
 """How much work steering was: what the operator put in, by axis, and what only a person's device records.
 
-The input is the velocity that the operator asked for on each axis, beside a policy that of the person. A
-hand's axes are the world's, whatever axes a person steers along: with a tool that turns, the axis changes.
-The scale is the largest value of each axis in all datasets that are compared: 1 is full deflection; an axis
-that was never used does not count.
+The input is the velocity that the operator asked for on each axis, beside a policy on those that they own;
+where both own one, it is their mean. A hand's axes are the world's, whatever axes a person steers along: with
+a tool that turns, the axis changes. The scale is the largest value of each axis in all datasets that are
+compared: 1 is full deflection; an axis that was never used does not count.
 Measures: Herlant et al. 2016, "Assistive teleoperation of robot arms via automatic time-optimal mode
 switching", for mode switches; the others are common in teleoperation.
 """
@@ -43,13 +43,13 @@ def input_reversals(episode: Demonstration, scale: Scale) -> float:
 @metric("", "lower")
 def mode_switches(episode: Demonstration, scale: Scale) -> float:
     """How often the mode, or the set of axes that the operator owned, changed; pauses are passed over."""
-    parts = [episode.column(part) for part in ("mode", "owned") if episode.has(part)]
+    parts, steers = [episode.column(part) for part in ("mode",) if episode.has(part)], slice(None)
+    by, least = ("owner", 2) if episode.has("owner") else ("owned", 1)  # 1 beside a policy is the policy
+    if episode.has(by):
+        parts.append(episode.matrix(by) >= least)
+        steers = np.delete(parts[-1], naming.gripper_entries(episode.entries(by)), axis=1).any(axis=1)
     if not parts:
         raise DoesNotApply("no column of the mode or of the axes that the operator owned")
-    steers = slice(None)
-    if episode.has("owned"):
-        grippers = naming.gripper_entries(episode.entries("owned"))
-        steers = np.delete(episode.matrix("owned"), grippers, axis=1).any(axis=1)
     rows = [part.reshape(len(part), -1)[steers] for part in parts]
     changed = [(each[1:] != each[:-1]).any(axis=1) for each in rows]
     return float(np.count_nonzero(np.any(changed, axis=0)))

@@ -48,9 +48,7 @@ def load_design(name: str) -> StudyDesign:
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, default=str)
     own = {"name": path.stem, "digest": hashlib.sha256(text.encode()).hexdigest()[:16]}
     for entry in own.keys() & content.keys():
-        raise HandrailError(
-            f"{where}: expected no {entry}: it follows from the rest, and from the file's name"
-        )
+        raise HandrailError(f"{where}: expected no {entry}: it follows from the rest and the file's name")
     if isinstance(tasks := content.get("tasks"), Mapping):
         check_known("task", tasks, TASKS)
     design = decoded({**content, **own}, StudyDesign, where)

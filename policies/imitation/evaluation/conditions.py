@@ -114,7 +114,7 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     path, step = place / _TRAINED, place.parent.name
     content = load_json(path, "settings of LeRobot") if path.is_file() else {}
     training = check(content, _Trained, repr(str(path)))
-    root, fps = Path((training.get("dataset") or {}).get("root") or place), config.fps or 20
+    root, fps = Path(str((training.get("dataset") or {}).get("root") or place)), config.fps or 20
     origin: dict[str, Any] = {"environment": "", "robot": ""}
     with suppress(HandrailError, OSError):  # it need not be here
         origin, fps = origin_of(info := read_info(root), read_episodes(root)), info.fps
@@ -229,9 +229,7 @@ def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], li
         raise HandrailError(f"--mode {config.mode}: expected a policy of it, got {', '.join(sorted(modes))}")
     environments = {checkpoint.meta.environment for checkpoint in checkpoints}
     if len(environments) > 1:
-        raise HandrailError(
-            f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
-        )
+        raise HandrailError(f"--policy: expected policies of one task, got {', '.join(sorted(environments))}")
     for perturbation, protection, checkpoint in itertools.product(
         config.perturbations, config.protections, checkpoints
     ):

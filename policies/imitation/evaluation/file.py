@@ -47,13 +47,14 @@ class EvaluationFile:
             read_evaluations([path])
             self.content |= read_json(path, MOST_BYTES)
         task = self.content.setdefault("task", conditions[0].checkpoint.meta.environment)
+        told = {label: self.content["conditions"].get(label) for label in self.content["arms"]}
         for condition in conditions:
             label, checkpoint = condition.label, condition.checkpoint
             where = f"--json {self._path}: condition {label!r}"
             if checkpoint.meta.environment != task:
                 raise HandrailError(f"{where}: expected task {task}, got {checkpoint.meta.environment}")
-            before = self.content["conditions"].get(label)
-            if label in self.content["arms"] and before != condition.conditions:
+            before = told.setdefault(label, condition.conditions)
+            if before != condition.conditions:
                 raise HandrailError(
                     f"{where}: expected {before}, got {condition.conditions}; say another --label"
                 )
@@ -121,14 +122,14 @@ def _cells(entries: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
         f"{succeeded.sum():.0f}/{len(rows)} = {succeeded.mean():.0%}",
         f"{low:.0%} – {high:.0%}",
         f"{np.median(times):.1f}" if times else "–",
-        *(f"{100 * np.mean([row.get(name, 0) for row in rows]):.1f}" for name in ("contacts", "brakes")),
+        *(f"{100 * np.mean([row.get(name) or 0 for row in rows]):.1f}" for name in ("contacts", "brakes")),
         ", ".join(f"{reason} {count}" for reason, count in reasons.most_common()) or "none",
     )
 
 
 def _caption(rows: Sequence[Mapping[str, Any]]) -> str:
     """Say what a step took, and what the intervals leave out."""
-    timed = [row["timing"] for row in rows if "timing" in row]
+    timed = [row["timing"] for row in rows if row.get("timing")]
     words = [
         f"{part} {np.median([timing[part] for timing in timed]):.2f} ms"
         for part in ("policy", "controller", "environment")

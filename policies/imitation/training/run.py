@@ -71,6 +71,10 @@ class TrainingRun:
         assert described is not None
         assert settings.output_dir is not None
         self._settings, self._learnt, self._encoder = settings, learnt, encoder
+        dropped = getattr(described, "drop_n_last_frames", 0)
+        self._drawn = learnt.draws.frames(dropped)
+        if not len(self._drawn):
+            raise HandrailError(f"training: expected episodes or corrections over {dropped} frames, got none")
         self._folder, self._sums = settings.output_dir, read_sums(checkpoint)
         self._accelerator = _accelerator(described)
         set_seed(settings.seed, self._accelerator)  # pyright: ignore[reportArgumentType]
@@ -185,8 +189,7 @@ class TrainingRun:
     def _batches(self, step: int) -> Iterator[Any]:
         """Yield batches for ever, from where a training that was cut off after a step goes on, to the bit."""
         settings, processes = self._settings, self._accelerator.num_processes
-        drawn = self._learnt.draws.frames(getattr(settings.policy, "drop_n_last_frames", 0))
-        each: Any = drawn, drawn + 1  # one by one, some of them several times
+        each: Any = self._drawn, self._drawn + 1  # one by one, some of them several times
         sampler = EpisodeAwareSampler(*each, shuffle=True, seed=settings.seed or 0)
         state = compute_sampler_state(step, len(sampler), settings.batch_size, processes)
         sampler.load_state_dict(state)

@@ -230,7 +230,7 @@ def _check_one_mode(info: DatasetInfo, selection: Selection, said: str) -> None:
     if _MODE in info.features:  # people may change it while they drive
         driven = [set(episode[_MODE]) - {""} for episode in _episodes(info, selection, [_MODE])]
         modes = modes.union(*driven)
-    if len(modes) > 1 or not modes <= {*MODES, said} - {""}:
+    if len(modes) > 1 or not modes <= {*MODES, *filter(MODES.accepts, (said,))}:
         words = "expected episodes of one teleop mode, whose controller completes the intent"
         found = ", ".join(sorted(mode or "no mode" for mode in modes))
         raise HandrailError(f"--actions intent: {words}; got {found}; say --mode, or --actions realised")

@@ -120,7 +120,7 @@ def test_files_beside_a_dataset_without_episodes_stay(tmp_path):
 
 def test_a_demo_removes_no_more_episodes_than_a_demo_has(tmp_path):
     root = copied(tmp_path / "dataset", make_dataset, episodes=2)
-    refused(tmp_path, "--overwrite", "--episodes", 1, name="demo", told="2 episodes, more than a demo has")
+    refused(tmp_path, "--overwrite", "--episodes", 1, name="demo", told="has 2 episodes, not 1")
     assert len(read_episodes(root)) == 2
 
 

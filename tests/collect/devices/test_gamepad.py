@@ -54,7 +54,7 @@ def test_unplugged_it_is_gone_and_says_what_to_do(pad, opened):
 def test_a_trigger_that_trembles_is_pressed_once(pad, opened):
     """Around its dead zone, and around where it is let go."""
     presses = []
-    for way in (0.13, 0.11, 0.13, 1.0, 0.13, 0.18, 0.13, 0.11, 0.18, 0.0, 1.0):
+    for way in (0.13, 0.11, 0.13, 0.23, 0.19, 0.23, 1.0, 0.13, 0.18, 0.13, 0.11, 0.18, 0.0, 0.3):
         pad.move("right_trigger", 2.0 * way - 1.0)  # as its sensor says it
         presses += opened.read().presses
     assert presses == ["right_trigger"] * 2

@@ -125,11 +125,18 @@ def test_its_handle_is_the_gripper_beside_a_policy_too(driven):
     person = LocalPerson(driven.person, driven.main, driven.beside, Follower(MODEL, LEADER), shared=True)
     shared = SharedOperator(person, policy := Fake(rests), arbiter("by_mask"), MODEL)
     shared.reset(driven.view(), np.random.default_rng(0))
-    driven.person.ask(Ask("start"))
+
+    def act(place):
+        driven.main.joints["handle.pos"] = place
+        driven.clock.now, driven.time = driven.clock.now + 0.05, driven.time + 0.05
+        return shared.act(replace(driven.view(), grippers=grippers))
+
     for wanted, place, closed in ((1.0, 100.0, 1.0), (1.0, 0.0, 1.0), (1.0, 100.0, 0.0), (0.0, 0.0, 1.0)):
         policy.says = replace(rests, grippers=(wanted,))
-        driven.main.joints["handle.pos"] = place
+        for moved in (100.0, 0.0, place):  # nothing counts that was undone before they go on
+            assert act(moved) is EpisodeEvent.PAUSE
+        driven.person.ask(Ask("start"))
         for _ in range(3):
-            driven.clock.now, driven.time = driven.clock.now + 0.05, driven.time + 0.05
-            grippers = shared.act(replace(driven.view(), grippers=grippers)).grippers
+            grippers = act(place).grippers
         assert grippers == (closed,)
+        driven.person.ask(Ask("pause"))

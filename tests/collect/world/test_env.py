@@ -133,6 +133,7 @@ def test_a_task_that_cannot_be_imported_is_one_line(wrong):
 def test_a_task_that_would_never_end_or_begin_is_one_line(limit):
     with pytest.raises(HandrailError, match="time_limit of the task: expected"):
         HandrailEnv(Reach(time_limit=limit))
+    HandrailEnv(Reach(time_limit=np.float32(3.0))).close()
 
 
 @pytest.mark.parametrize("features", [np.zeros(4), np.zeros((1, 7)), [0.0, np.nan, *[0.0] * 5], [np.inf] * 7])
