@@ -84,7 +84,8 @@ class Cockpit:
         self._send_stage()
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Begin an episode: the robot waits for the operator."""
+        """Begin an episode: the robot waits for the operator; what was asked of the one before is over."""
+        self._listen()
         self.person.reset(view, rng)
 
     def act(self, view: View) -> Intent | EpisodeEvent:

@@ -90,7 +90,8 @@ class LocalPerson:
         self._card.task, self._card.time_limit = env.task.description, env.task.time_limit
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Begin an episode: the robot waits for the operator."""
+        """Begin an episode: the robot waits for the operator; what was pressed is over, STOP is not."""
+        self._heard()
         self._handle, self._card.brakes = None, ""
         self.person.reset(view, rng)
 

@@ -36,9 +36,7 @@ class ExecutionConfig:
         """Check the settings."""
         ray, workers = f"--ray {self.ray}", f"--workers {self.workers}"
         if not 0 <= self.workers <= MOST_WORKERS:
-            raise HandrailError(
-                f"{workers}: expected a whole number from 1 to {MOST_WORKERS}, or 0 for all cores"
-            )
+            raise HandrailError(f"{workers}: expected a whole number from 1 to {MOST_WORKERS}, or 0 for all")
         if self.ray and self.workers != type(self).workers:
             raise HandrailError(f"{ray} and {workers}: expected one of them, got both")
         if self.ray:

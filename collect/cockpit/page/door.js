@@ -22,7 +22,11 @@ async function begin() {
   }
   door.hidden = true;
   document.getElementById("cockpit").hidden = false;
-  await import("./main.js");
+  await import("./main.js").catch((error) => { // no STOP that does nothing
+    document.getElementById("cockpit").hidden = true;
+    document.getElementById("door-error").textContent = `This browser cannot show the robot: ${error.message}`;
+    door.hidden = false;
+  });
 }
 
 door.addEventListener("submit", async (event) => {

@@ -19,6 +19,7 @@ export class Gamepad {
       if (!pad) this.say("Gamepad unplugged: it has let go.");
       else this.say(`Gamepad found. Hold ${this.deadman(pad)} to move.`);
       this.was = null;
+      this.letGo();
     }
     this.pad = pad;
     return pad;

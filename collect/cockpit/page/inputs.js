@@ -72,6 +72,7 @@ export class Inputs {
 
   press(event) {
     if (event.metaKey) this.held.clear(); // macOS tells of no key that goes up while that one is held
+    if (event.code !== STOP && document.querySelector("#study:not([hidden])")) return; // a card is read, and nothing moves
     if (!this.mapping || isTyping(event.target) || (event.code !== STOP && (event.ctrlKey || event.metaKey || event.altKey))) return;
     if (event.code === BACK) {
       if (this.act("back")) event.preventDefault();

@@ -52,6 +52,7 @@ const link = new Link({
   over: (said) => panels.ended(said),
   picture: (index, blob) => panels.picture(index, blob),
   stage: async (said) => {
+    if (stage && stage.robot !== said.robot) return location.reload(); // nothing of it fits
     stage = said;
     if (inputs.mapping?.name !== new Mapping(stage).name) inputs.mapping = new Mapping(stage); // else it keeps what was changed
     inputs.isShared = Boolean(stage.policy);
@@ -120,6 +121,7 @@ function label() {
 for (const name of ["start", "pause", "undo", "success", "failure", "restart", "discard", "quit"]) byId(name).addEventListener("click", () => act(name));
 let stopPressed = -Infinity; // an e-stop does not wait until the finger goes up; the click that follows is the same press [ms]
 byId("stop").addEventListener("pointerdown", (event) => { stopPressed = event.timeStamp; act("stop"); });
+byId("stop").addEventListener("pointerup", (event) => { stopPressed = event.timeStamp; });
 byId("stop").addEventListener("click", (event) => { if (event.timeStamp - stopPressed > 1000) act("stop"); });
 for (const id of ["help-open", "help-close"]) byId(id).addEventListener("click", () => act("help"));
 document.addEventListener("pointerup", (event) => { // while one finger steers browsers make no click of another one's

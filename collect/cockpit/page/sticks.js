@@ -33,17 +33,16 @@ export class TouchSticks {
   lever(lever, act) {
     const name = lever.dataset.lever;
     if (name === "grip") lever.addEventListener("click", () => act("grip"));
-    if (name === "turn") lever.addEventListener("click", () => this.turn(lever));
+    if (name === "turn") lever.addEventListener("click", () => this.turn());
     if (name !== "up" && name !== "down") return;
     lever.addEventListener("pointerdown", (event) => { lever.setPointerCapture(event.pointerId); this.lift = name === "up" ? 1 : -1; });
     for (const end of ENDS) lever.addEventListener(end, () => { this.lift = 0; });
   }
 
   // The other thing that the sticks can do: turn the hand, or move the next joints.
-  turn(lever) {
+  turn() {
     if (owns(this.inputs.owned, "ee.")) this.turns = !this.turns;
     else this.inputs.nextBank();
-    lever.setAttribute("aria-pressed", String(this.turns));
   }
 
   letGo() {
@@ -69,6 +68,7 @@ export class TouchSticks {
       const words = `${{ joint: "joints", ee: "hand", pair: "both hands", "": "joints" }[what] ?? what}: ${said(2 * index)}`;
       write(stick.querySelector("span"), words);
     });
+    this.box.querySelector("[data-lever=turn]").setAttribute("aria-pressed", String(this.turns));
     for (const name of ["up", "down"]) this.box.querySelector(`[data-lever=${name}]`).hidden = !this.inputs.owned.has("ee.vz");
   }
 }

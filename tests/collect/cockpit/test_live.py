@@ -15,8 +15,9 @@ from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.strain import Strain
 from handrail.collect.commands.record import record
 from handrail.collect.config import DatasetConfig, DriveConfig, FoundDatasetConfig, RecordConfig
-from handrail.collect.operators.operator import View
+from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask
+from handrail.collect.operators.person.person import Phase
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.recording.writer import EpisodeWriter
 
@@ -63,6 +64,17 @@ def opened(monkeypatch):
             return person, server, view
 
         yield made
+
+
+def test_start_said_while_an_episode_is_saved_begins_none_and_a_stop_holds(opened):
+    """Nobody has seen the next scene yet."""
+    for said, phase in ((Kind.ASK, Phase.READY), (Kind.STOP, Phase.STOPPED)):
+        person, server, view = opened()
+        said_then = [(said, {"what": "start", "value": True})]
+        server.receive = lambda waiting=said_then: [waiting.pop()] if waiting else []
+        person.reset(view, np.random.default_rng(0))
+        assert person.act(view) is EpisodeEvent.PAUSE
+        assert person.person.phase is phase
 
 
 def shade(jpeg):

@@ -211,7 +211,7 @@ def test_no_worker_outlives_whoever_gave_it_work(number, tmp_path):
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"workers": -1}, "--workers -1: expected a whole number from 1 to 256, or 0 for all cores"),
+        ({"workers": -1}, "--workers -1: expected a whole number from 1 to 256, or 0 for all"),
         ({"workers": 1000}, "--workers 1000"),
         ({"workers": 2, "ray": "auto"}, "--ray auto and --workers 2: expected one of them"),
     ],
