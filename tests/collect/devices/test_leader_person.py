@@ -1,6 +1,7 @@
 """Laws of a person with a leader arm: the clutch moves the arm, the other hand the base; nothing jumps."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -126,7 +127,7 @@ def test_its_handle_is_the_gripper_beside_a_policy_too(driven):
     shared = SharedOperator(person, policy := Fake(rests), arbiter("by_mask"), MODEL)
     shared.reset(driven.view(), np.random.default_rng(0))
 
-    def act(place):
+    def act(place) -> Any:
         driven.main.joints["handle.pos"] = place
         driven.clock.now, driven.time = driven.clock.now + 0.05, driven.time + 0.05
         return shared.act(replace(driven.view(), grippers=grippers))
