@@ -12,15 +12,18 @@ from handrail.controllers.interrupts import Interrupts
 
 
 class StoppingServer:
-    """Passes on a Start, a STOP, and then that the trial has failed."""
+    """Once the trial is there passes on a Start, a STOP, and then that it has failed."""
 
     def __init__(self, *asks):
         asked = [{"what": what, "value": value} for what, value in (*asks, ("start", True))]
         self.unread = [*((Kind.ASK, each) for each in asked), (Kind.STOP, None)]
         self.pipe, self.dropped = self, Counter()
-        self.sent = []
+        self.sent, self.asked = [], 0
 
     def receive(self):
+        self.asked += 1
+        if self.asked == 1:  # while the trial is made
+            return []
         messages, self.unread = self.unread, []
         return messages or [(Kind.STILL, {"what": "failure", "value": True})]
 
