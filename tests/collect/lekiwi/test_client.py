@@ -135,7 +135,7 @@ def test_red_before_a_lekiwis_camera_is_red_in_the_dataset():
         (("--robot_client", "lawnmower"), "unknown --robot_client 'lawnmower': expected one of lekiwi"),
         (("--robot_client", "lekiwi", "--operator", "browser"), "expected another --operator"),
         (("--robot_client", "lekiwi", "--no_physics"), "expected none of"),
-        (("--robot_client", "lekiwi"), "--operator scripted: expected a person: a robot needs one"),
+        (("--robot_client", "lekiwi"), "--operator scripted: expected a person, to stop the robot"),
         (("--client.simulated",), "expected --robot_client too"),
         (
             ("--robot_client", "lekiwi", "--client.port_zmq_cmd", "0"),
