@@ -103,7 +103,7 @@ def _checked(argument: str) -> str:
     value = argument.rpartition("=")[2]
     if any("\udc80" <= letter <= "\udcff" for letter in argument):
         fail(f"argument {os.fsencode(argument)!r}: expected text in UTF-8, got other bytes", BAD_INPUT)
-    if re.fullmatch(r"~\S*|~.*/.*", value) and os.path.expanduser(value) == value:
+    if re.fullmatch(r"~\S*|~[^/\s]+/.*", value) and os.path.expanduser(value) == value:
         fail(f"argument {argument!r}: expected the home of a person on this computer", BAD_INPUT)
     return _boolean(argument)
 

@@ -85,6 +85,7 @@ class Cockpit:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator; what was asked of the one before is over."""
+        self.person.reset(view, rng)  # what is heard now is not of the episode that is saved
         self._listen()
         self.person.reset(view, rng)
 

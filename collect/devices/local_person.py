@@ -91,6 +91,7 @@ class LocalPerson:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator; what was pressed is over, STOP is not."""
+        self.person.reset(view, rng)  # what is heard now is not of the episode that is saved
         self._heard()
         self._handle, self._card.brakes = None, ""
         self.person.reset(view, rng)

@@ -182,7 +182,7 @@ class Conductor:
                 if said.item == PAUSE:
                     return False
                 if said.item == NEXT:
-                    if asked.is_filled_in(answers):
+                    if all(item.name in answers for item in asked.items):
                         return True
                     continue
                 try:

@@ -1,7 +1,6 @@
 """Questions of a form, and which answers they take."""
 
 import unicodedata
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,7 +73,3 @@ class Form:
             if item.name == name:
                 return item.check(value)
         raise HandrailError(f"form {self.name}: unknown item {shown(name)}")
-
-    def is_filled_in(self, answers: Mapping[str, Answer]) -> bool:
-        """Return whether every question is answered or declined."""
-        return all(item.name in answers for item in self.items)

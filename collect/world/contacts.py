@@ -23,6 +23,9 @@ class Contacts:
         scene: what stands around the robot.
         grasp: names of the geoms that may touch movable things.
         fingers: names of the geoms of each hand's two, which can hold something; () of one that cannot.
+
+    Attributes:
+        pairs: of geoms that met forbiddenly since the last `clear`.
     """
 
     def __init__(
@@ -37,14 +40,14 @@ class Contacts:
         forbidden[(_ROBOT, _GRASP), :] = forbidden[:, (_ROBOT, _GRASP)] = True
         forbidden[_GRASP, _MOVABLE] = forbidden[_MOVABLE, _GRASP] = False
         self._forbidden = forbidden[np.ix_(kinds, kinds)]
-        self._pairs: set[tuple[int, int]] = set()
-        self._seen: dict[bytes, list[tuple[int, int]]] = {}  # forbidden ones, by all that touch
+        self.pairs: frozenset[tuple[int, int]] = frozenset()
+        self._seen: dict[bytes, frozenset[tuple[int, int]]] = {}  # forbidden ones, by all that touch
         self._fingers = [[model.geom(name).id for name in pair] for pair in fingers]
-        self._portable = {bodies[item.name]: item.name for item in scene.movables if item.portable}
+        self._portable = {bodies[item.name]: item.name for item in scene.movables if item.slide is None}
 
     def clear(self) -> None:
         """Forget the forbidden contacts so far."""
-        self._pairs.clear()
+        self.pairs = frozenset()
 
     def look(self, data: MjData) -> None:
         """Remember the forbidden contacts of this instant, at which something touches."""
@@ -53,13 +56,13 @@ class Contacts:
         if place not in self._seen:
             first, second = touching.T
             hit = self._forbidden[first, second]
-            self._seen[place] = list(zip(first[hit].tolist(), second[hit].tolist(), strict=True))
-        self._pairs.update(self._seen[place])
+            self._seen[place] = frozenset(zip(first[hit].tolist(), second[hit].tolist(), strict=True))
+        self.pairs |= self._seen[place]
 
     @property
     def names(self) -> tuple[str, ...]:
         """The pairs of geoms that met since the last `clear`, sorted."""
-        pairs = (sorted(self._model.geom(geom).name for geom in pair) for pair in self._pairs)
+        pairs = (sorted(self._model.geom(geom).name for geom in pair) for pair in self.pairs)
         return tuple(sorted(" – ".join(pair) for pair in pairs))
 
     def held(self, data: MjData) -> dict[str, int]:

@@ -95,7 +95,6 @@ def _add_sliding_fingers(
     )
     thickness = min(0.025, (gripper.tip - length) / 2)
     palm.add_geom(
-        name=hand.named("rail"),
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[gripper.stroke / 2 + width, depth / 2, thickness / 2],
         pos=[0.0, 0.0, gripper.tip - length - thickness / 2],

@@ -146,7 +146,7 @@ class Gate:
             q: where the robot is, (n,).
         """
         said, n = np.asarray(command, dtype=np.float64).ravel(), len(self.velocity)
-        usable = len(said) == n + len(self.grippers) and all(map(math.isfinite, said[n:]))
+        usable = len(said) == n + len(self.grippers) and all(map(math.isfinite, said))
         if usable:
             self.grippers = closed(tuple(said[n:].tolist()), len(self.grippers))
         velocity, _ = self._limiter.limit(self.velocity, said[: n if usable else 0], self._period, q)

@@ -141,10 +141,12 @@ def _base_inertia(model: RobotModel) -> pin.Inertia:
 
 def _set_inertia(body: MjsBody, inertia: pin.Inertia) -> None:
     moments, axes = np.linalg.eigh(inertia.inertia)
+    moments = np.maximum(moments, 1e-6)
+    moments[2] = min(moments[2], moments[0] + moments[1])  # more is of no solid; MuJoCo refuses it
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     body.explicitinertial = True
     body.mass, body.ipos = max(float(inertia.mass), 1e-3), inertia.lever
-    body.inertia, body.iquat = np.maximum(moments, 1e-6), quaternion_from_matrix(axes)
+    body.inertia, body.iquat = moments, quaternion_from_matrix(axes)
 
 
 def _solid(model: RobotModel) -> list[PlacedShape]:

@@ -12,6 +12,7 @@ from handrail.collect.world.rendering import Painter
 from handrail.collect.world.robot import build_robot
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import restated
 from handrail.controllers.modelling.pairs import configurations
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.datasets.presentation.drawing import COLOURS, INK, new_figure, png, tidy
@@ -51,7 +52,8 @@ def _painted(model: RobotModel) -> NDArray[np.uint8]:
     right = np.cross(-away, [0.0, 0.0, 1.0])
     pose = geometry.camera_pose(middle + away, right / np.linalg.norm(right), -away / np.linalg.norm(away))
     spec.worldbody.add_camera(name="picture", fovy=42.0, **pose)
-    compiled = spec.compile()
+    with restated(f"robot {robot.name}: MuJoCo says", ValueError):
+        compiled = spec.compile()
     data = mujoco.MjData(compiled)
     for name, value in zip(model.joints, q, strict=True):
         data.qpos[compiled.joint(name).qposadr[0]] = value

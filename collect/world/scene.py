@@ -9,6 +9,7 @@ import numpy as np
 from handrail.collect.world import geometry
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.robot.description import check_once
 from handrail.controllers.robot.model import Pose
 from handrail.controllers.robot.shape import Obstacle, Shape
 
@@ -116,11 +117,6 @@ class SceneObject(FrozenArrays):
         return self.mass > 0
 
     @property
-    def portable(self) -> bool:
-        """Whether the hand can carry it away."""
-        return self.movable and self.slide is None
-
-    @property
     def top(self) -> float:
         """Height of its upper face above the floor [m], for an upright object."""
         return float(self.position[2] + geometry.bounding_box(self.shape)[2] / 2)
@@ -193,10 +189,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check the names."""
-        names = [item.name for item in self.objects]
-        for name in names:
-            if names.count(name) > 1:
-                raise HandrailError(f"scene: expected unique object names, got {name!r} more than once")
+        check_once([item.name for item in self.objects], "names of objects in a scene")
 
     def find(self, name: str) -> SceneObject:
         """Return an object by name."""

@@ -151,14 +151,14 @@ class Simulation(Plant):
 
     def checkpoint(self) -> object:
         """Return the whole state, to come back to."""
-        return copy(self.data), self._gate.state()
+        return copy(self.data), self._gate.state(), self._contacts.pairs
 
     def restore(self, checkpoint: Any) -> None:
         """Come back to a state: from there all goes on as it did."""
-        data, sent = checkpoint
+        data, sent, pairs = checkpoint
         mujoco.mj_copyData(self.data, self.mujoco_model, data)
         self._gate.restore(sent)
-        self._contacts.clear()
+        self._contacts.pairs = pairs
         self._held_at = -math.inf
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.description import check_once
 from handrail.controllers.robot.model import RobotModel, joint_memory, joints_of
 from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes, scene_shapes
@@ -42,7 +43,7 @@ class ShapePairs:
         self._model = model
         description = model.description
         self._placed = [*description.collision, *map(_placed, obstacles)]
-        _check_names([thing.name for thing in self._placed])
+        check_once([*(thing.name for thing in self._placed), FLOOR], "names of obstacles and shapes")
         self._index = {thing.name: index for index, thing in enumerate(self._placed)}
         self._index[FLOOR] = len(self._placed)
         tools = {thing.name for thing in description.collision if thing.tool}
@@ -169,14 +170,6 @@ class ShapePairs:
         for row in rows:
             first, second = (self._shape_bounds.get(name, none) for name in self.names[row])
             memory.bounds[:, row] = (memory.moves[row] != 0.0) * np.maximum(first, second)
-
-
-def _check_names(names: list[str]) -> None:
-    """Check that nothing has the name of something else: of a thing, a shape of the robot, the floor."""
-    if twice := {name for name in names if names.count(name) > 1 or name == FLOOR}:
-        raise HandrailError(
-            f"names of obstacles and shapes: expected each once and none {FLOOR!r}, got {sorted(twice)} again"
-        )
 
 
 def _placed(obstacle: Obstacle) -> PlacedShape:

@@ -168,8 +168,8 @@ def _build(description: RobotDescription) -> pin.Model:
     base.addFrame(pin.Frame("planar_base", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
     model, tools = base, [hand.named("tool") for hand in description.hands]
     for arm in description.arms:
-        if not model.existFrame(arm.on):
-            raise HandrailError(f"arm {arm.prefix!r} of robot {description.name}: on: no frame {arm.on!r}")
+        if not model.existFrame(arm.on, pin.FrameType.BODY):
+            raise HandrailError(f"arm {arm.prefix!r} of robot {description.name}: on: no link {arm.on!r}")
         own = _arm(arm, description.name)
         frames = [frame.name for each in (model, own) for frame in list(each.frames)[1:]]
         check_once([*base.names, *tools, *frames], f"URDF {arm.urdf}: names of links and joints")
@@ -231,8 +231,8 @@ def _arm(arm: Arm, robot: str) -> pin.Model:
 
 
 def _add_tool(model: pin.Model, hand: EndEffector, robot: str) -> None:
-    if not model.existFrame(hand.frame):
-        raise HandrailError(f"tool frame {hand.frame!r} of robot {robot}: not in the URDF")
+    if not model.existFrame(hand.frame, pin.FrameType.BODY):
+        raise HandrailError(f"tool frame {hand.frame!r} of robot {robot}: no link of its URDF")
     parent_id = model.getFrameId(hand.frame)
     parent = model.frames[parent_id]
     placement = parent.placement * _se3(hand.placement)

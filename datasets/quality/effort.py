@@ -46,8 +46,8 @@ def mode_switches(episode: Demonstration, scale: Scale) -> float:
     parts, steers = [episode.column(part) for part in ("mode",) if episode.has(part)], slice(None)
     by, least = ("owner", 2) if episode.has("owner") else ("owned", 1)  # 1 beside a policy is the policy
     if episode.has(by):
-        parts.append(episode.matrix(by) >= least)
-        steers = np.delete(parts[-1], naming.gripper_entries(episode.entries(by)), axis=1).any(axis=1)
+        own = np.delete(episode.matrix(by) >= least, naming.gripper_entries(episode.entries(by)), axis=1)
+        parts, steers = [*parts, own], own.any(axis=1)
     if not parts:
         raise DoesNotApply("no column of the mode or of the axes that the operator owned")
     rows = [part.reshape(len(part), -1)[steers] for part in parts]

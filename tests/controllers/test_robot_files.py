@@ -1,6 +1,7 @@
 """A robot's file from whoever it is: a robot, or one line; whatever is put into it, deep down or between."""
 
 import os
+import re
 import shutil
 import signal
 from contextlib import suppress
@@ -81,6 +82,14 @@ def test_a_shape_with_a_name_that_is_taken_is_one_line(name, words, tmp_path):
     path.write_text(TEXTS["ridgeback_ur10"].replace("[[visual]]", shape, 1))
     assert words in refused("--robot", path, "--task", "pick_place", "--dataset.root", tmp_path / "set")
     assert not (tmp_path / "set").exists()
+
+
+def test_a_hand_stands_on_a_link_not_on_a_joint(tmp_path):
+    """No joint of the arm would count as moving it."""
+    path = tmp_path / "robot.toml"
+    path.write_text(re.sub(r'frame = ".*"', 'frame = "wrist_3_joint"', TEXTS["ridgeback_ur10"], count=1))
+    with pytest.raises(HandrailError, match="tool frame 'wrist_3_joint' of robot ridgeback_ur10: no link"):
+        RobotModel(load_description(path))
 
 
 def test_a_thing_of_a_task_that_is_wrong_is_not_blamed_on_the_robot():

@@ -76,6 +76,7 @@ class Person:
         self.setting, self.phase = Setting(modes[first], hand=model.hand.name), Phase.READY
         self.inputs: Input | None = None
         self.received = self.round_trip = 0.0
+        self.closed = [0.0] * len(self.meaning.hands)
         self._grips: tuple[bool, ...] = ()  # the device's, as it said last: a change changes a gripper
         self._undone = False
         self.practises = False
@@ -150,7 +151,7 @@ class Person:
                 self.setting = replace(setting, frame=value)
             case "speed":
                 self.setting = replace(setting, speed=max(value, 0.05))
-            case "lock":
+            case "lock" if self._lost is Phase.LOST:  # a policy would move them
                 locked = sorted(set(value) & set(range(len(channels.joints))))
                 self.setting = setting.switched(locked=tuple(locked))
 

@@ -92,7 +92,8 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
         if not (robot and task):
             raise HandrailError(f"{where}: expected --robot and --task: neither it nor its dataset says them")
         meta = replace(meta, environment=task)
-        if config.mode and not meta.mode:
+        own = len(AgentObservation(load_model(robot)).names)  # more: robot and scene, of lerobot-record
+        if config.mode and not meta.mode and sizes.get(STATE) != own:
             meta = replace(meta, mode=config.mode, actions="intent")
     meta = replace(meta, robot=robot or meta.robot, hand=config.hand or meta.hand)
     if meta.hand == MIXED:
@@ -253,7 +254,9 @@ def _as_asked(checkpoint: Checkpoint, config: EvaluateConfig) -> Checkpoint:
         asked, own = getattr(config, name), getattr(checkpoint.meta, name)
         is_trusted = name == "mode" and asked not in MODES  # a `module:name`: others may have other modes
         if asked and asked != own and not is_trusted:
-            raise HandrailError(f"--policy {checkpoint.folder}: expected --{name} {own}, got {asked}")
+            raise HandrailError(
+                f"--policy {checkpoint.folder}: expected --{name} {own or 'left out'}, got {asked}"
+            )
     return checkpoint
 
 

@@ -41,8 +41,9 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
     if not _is_completed(mode):
         fit = ", ".join(name for name, each in build_modes(config, env).items() if _is_completed(each))
         raise HandrailError(f"--mode {mode.name}: expected one that the MPC completes beside a policy: {fit}")
+    usual = "" if config.mask else config.mode
     asked = EvaluateConfig(
-        task=config.task, robot=config.robot, mode="" if config.mask else config.mode, fps=round(env.fps)
+        task=config.task, robot=config.robot, mode=usual, hand=config.hand, fps=round(env.fps)
     )
     checkpoints = [read_checkpoint(Path(folder).expanduser(), asked) for folder in config.policy]
     for checkpoint in checkpoints:

@@ -50,13 +50,13 @@ class EvaluationFile:
         told = {label: self.content["conditions"].get(label) for label in self.content["arms"]}
         for condition in conditions:
             label, checkpoint = condition.label, condition.checkpoint
-            where = f"--json {self._path}: condition {label!r}"
+            where = f"{f'--json {path}: ' if path else ''}condition {label!r}"
             if checkpoint.meta.environment != task:
                 raise HandrailError(f"{where}: expected task {task}, got {checkpoint.meta.environment}")
-            before = told.setdefault(label, condition.conditions)
-            if before != condition.conditions:
+            here = condition.conditions
+            if (before := told.setdefault(label, here)) != here:
                 raise HandrailError(
-                    f"{where}: expected {before}, got {condition.conditions}; say another --label"
+                    f"{where}: expected {before}, got {here}; run it apart, by another --label"
                 )
             if any(entry.get("checkpoint") != checkpoint.digest for entry in self._entries(condition)):
                 raise HandrailError(f"{where}: has another policy of dataset draw, seed {checkpoint.key}")

@@ -87,8 +87,8 @@ class PolicyInterface:
         masks: set[tuple[bool, ...]] = set()
         for columns in episodes if actions == "intent" else ():
             rows = columns[MASK][:, : len(channels)].astype(bool)
-            masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
-        if actions == "intent" and not any(map(any, masks)):
+            masks |= set(map(tuple, np.unique(rows[rows.any(axis=1)], axis=0).tolist()))  # pauses teach rest
+        if actions == "intent" and not masks:
             raise HandrailError("intent as action: expected episodes in which an operator steers, got none")
         return cls(actions, state, environment, channels, tuple(sorted(masks)), base_pose, True)
 
@@ -100,7 +100,7 @@ class PolicyInterface:
         around = (
             f"{name}.{hand}{part}"
             for name, parts, _ in self.objects
-            for hand in (self._seers if parts in SEEN else ("",))
+            for hand in ([tool.removesuffix("tool") for tool in self.tools] if parts in SEEN else ("",))
             for part in SEEN.get(parts, parts)
         )
         return (*self._own, *tools, *base), tuple(around)
@@ -182,11 +182,6 @@ class PolicyInterface:
     def tools(self) -> tuple[str, ...]:
         """Names of the hands' tools, as recorded."""
         return tuple(name.removesuffix("gripper") + "tool" for name in self._known.grippers)
-
-    @property
-    def _seers(self) -> tuple[str, ...]:
-        """The hands from which an object is seen, as its numbers' names have them; "" of one hand."""
-        return tuple(tool.removesuffix("tool") for tool in self.tools)
 
     @property
     def _needed(self) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ def same_interface(init: str, earlier: PolicyMeta, interface: PolicyInterface) -
     for name in ("state_names", "environment_names", "channels", "base_pose"):
         if getattr(known, name) != getattr(interface, name):
             raise HandrailError(f"{refused} {name.replace('_', ' ')}, got {shown(getattr(known, name))}")
-    if new := [mask for mask in interface.masks if any(mask) and mask not in known.masks]:
+    if new := [mask for mask in interface.masks if mask not in known.masks]:
         names = [name for name, owned in zip(interface.channels, new[0], strict=True) if owned]
         raise HandrailError(f"{refused} masks; it has none of {', '.join(names)}")
     return replace(interface, masks=known.masks)

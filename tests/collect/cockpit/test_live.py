@@ -53,14 +53,15 @@ def opened(monkeypatch):
     monkeypatch.setattr(Strain, "picture_period", 0.0)
     with environment("Reach") as env:
 
-        def made(real=False):
+        def made(real=False, begins=True):
             env.reset(seed=3)
             monkeypatch.setattr(env, "real", real)
             config = RecordConfig(task="reach", mode="ee", dataset=DatasetConfig(place="somewhere"))
             person = cockpit.open_cockpit(config, env, lambda words: None)
             view = View(env.plant.state(), env.task_state())
             person.begin(env, 3)
-            person.reset(view, np.random.default_rng(0))
+            if begins:
+                person.reset(view, np.random.default_rng(0))
             return person, server, view
 
         yield made
@@ -75,6 +76,16 @@ def test_start_said_while_an_episode_is_saved_begins_none_and_a_stop_holds(opene
         person.reset(view, np.random.default_rng(0))
         assert person.act(view) is EpisodeEvent.PAUSE
         assert person.person.phase is phase
+
+
+def test_what_is_pressed_before_the_first_episode_is_no_error(opened):
+    person, server, view = opened(begins=False)
+    said = [(Kind.ASK, {"what": "practice", "value": True}), (Kind.ASK, {"what": "quit", "value": True})]
+    server.receive = lambda: [said.pop()] if said else []
+    person.person.grip(0)
+    person.reset(view, np.random.default_rng(0))
+    assert person.person.closed == [0.0]
+    assert person.act(view) is EpisodeEvent.QUIT
 
 
 def shade(jpeg):

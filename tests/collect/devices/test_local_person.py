@@ -177,14 +177,6 @@ def test_what_is_heard_with_a_stop_does_not_undo_it(pad, keys):
     assert driven.local.between() is EpisodeEvent.PAUSE
 
 
-def test_start_pressed_before_an_episode_is_there_does_not_begin_it():
-    driven = Driven("gamepad")
-    driven.hold()
-    driven.main.presses = ["start"]
-    driven.local.reset(driven.view(), np.random.default_rng(0))
-    assert driven.act() is EpisodeEvent.PAUSE
-
-
 def test_an_episode_that_is_judged_with_a_stop_is_over():
     driven = Driven("gamepad", beside="keyboard")
     driven.begin()

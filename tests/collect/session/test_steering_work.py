@@ -14,8 +14,11 @@ from handrail.collect.session.session import Session
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent, RawInput
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality import effort
+from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.load import read_demonstrations
+from handrail.datasets.reading.reader import DatasetInfo
 
 
 class Person:
@@ -54,3 +57,11 @@ def test_work_is_what_was_asked_for_and_pauses_are_none(tmp_path, speed, reading
     scale: Any = SimpleNamespace(input_scale=np.full(channels.size, 0.2))
     assert effort.mode_switches.measure(episode, scale) == expected[0]
     assert effort.active_axes.measure(episode, scale) == pytest.approx(expected[1], abs=0.2)
+
+
+def test_a_gripper_that_is_pressed_beside_a_policy_is_no_switch(tmp_path):
+    """It is the person's for a moment; the axes stay with the policy, or the person."""
+    names, owner = ("base.vx", "ee.vx", "gripper"), np.array([[2, 1, 1], [2, 1, 2], [2, 1, 1], [2, 2, 2]])
+    info = DatasetInfo(tmp_path, 10, "arm", {"owner": Feature("int8", (3,), names)}, 1, 1, "", "", True)
+    episode = Demonstration(0, info, {"owner": owner}, {"length": 4})
+    assert effort.mode_switches.measure(episode, SimpleNamespace()) == 1.0

@@ -71,6 +71,26 @@ def test_a_checkpoint_is_of_its_own_episode_alone(plant):
         np.testing.assert_array_equal(env.state().q, now.q)
 
 
+def test_a_number_that_is_not_finite_leaves_the_gripper_as_it_is():
+    with environment("PickPlace") as env:
+        env.reset(seed=1)
+        wild = np.full(env.model.size + 1, np.nan)
+        wild[-1] = 1.0
+        assert env.step(wild)[-1]["sent"][-1] == 0.0
+
+
+def test_what_touches_is_said_again_after_an_undo():
+    with environment("Reach") as env:
+        env.reset(seed=1)
+        q = env.state().q.copy()
+        q[4] += 1.2
+        env.simulation.show(q)
+        touching = env.step(action(env))[-1]["contacts"]
+        then = env.checkpoint()
+        assert touching
+        assert env.restore(then)[1]["contacts"] == touching
+
+
 @pytest.mark.needs_gl
 def test_cameras_change_nothing():
     with environment() as blind, environment(cameras=CAMERAS, image_size=(16, 16)) as seeing:

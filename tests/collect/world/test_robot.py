@@ -92,6 +92,14 @@ def test_mass_matrix_is_pinocchios_plus_drives_gripper_and_chassis(model):
     np.testing.assert_allclose(M[:base, arm], expected[:base, arm], atol=2e-3)
 
 
+def test_an_inertia_of_no_solid_is_the_nearest_of_one():
+    """Many public URDFs have some; MuJoCo refuses them."""
+    model = RobotModel(load_description("ridgeback_ur10"))
+    model.pinocchio.inertias[6] = pin.Inertia(1.0, np.zeros(3), np.diag([0.01, 0.001, 0.002]))
+    compiled = build_robot(model, meshes=False).compile()
+    assert np.sort(compiled.body("elbow_joint_body").inertia) == pytest.approx([0.001, 0.002, 0.003])
+
+
 def test_home_touches_nothing(model):
     simulation = Simulation(model, Scene(), np.array(model.description.home), 0.05)
     simulation.send(closing(model, grip=0.0))

@@ -166,7 +166,7 @@ def test_a_grasped_cube_stays_through_lifting_driving_and_turning():
 
 def test_a_scene_refuses_two_things_of_one_name():
     thing = SceneObject("thing", box([0.1] * 3), np.zeros(3))
-    with pytest.raises(HandrailError, match="unique object names, got 'thing'"):
+    with pytest.raises(HandrailError, match="objects in a scene: expected each once, got 'thing' twice"):
         Scene((thing, thing))
 
 

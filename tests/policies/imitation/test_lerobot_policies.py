@@ -9,7 +9,7 @@ import pytest
 from policy_helpers import checkpoint, unable, untrained_act
 
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.evaluation.conditions import policy_conditions
+from handrail.policies.imitation.evaluation.conditions import policy_conditions, read_checkpoint
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, write_meta
@@ -62,6 +62,19 @@ def test_a_policy_of_plain_lerobot_drives(honest):
     assert (row["length"], row["malformed"]) == (0.5, 0)
     said = {"robot": "ridgeback_ur10", "fps": "20", "actions": "recorded"}
     assert said.items() <= content["conditions"]["act"].items()
+
+
+@pytest.mark.parametrize("around", [{}, {"observation.images.wrist": entry("VISUAL", 3, 64, 64)}])
+def test_joint_velocities_are_no_intents_of_a_mode_with_as_many_numbers(around, plain):
+    """`base+ee` has ten, too: beside a person its name is always said."""
+    reads(plain, **FEATURES | around)
+    if around:
+        reads(plain, **{"observation.state": FEATURES["observation.state"]} | around)
+    asked = config(plain, mode="base+ee")
+    meta = read_checkpoint(plain, asked).meta
+    assert (meta.actions, meta.intent_mode) == ("recorded", "")
+    with pytest.raises(HandrailError, match="expected --mode left out"):
+        policy_conditions(asked)
 
 
 def test_an_untrained_act_drives_without_contact_and_repeatably(tmp_path):

@@ -208,6 +208,8 @@ def test_wrong_inputs_are_named():
     with pytest.raises(HandrailError, match=r"observation\.environment_state"):
         PolicyInterface.of_dataset(only_state, [columns], "intent")
     idle = columns | {"teleop.mask": np.zeros_like(columns["teleop.mask"])}
+    paused = PolicyInterface.of_dataset(FEATURES, [columns, idle], "intent")
+    assert paused == PolicyInterface.of_dataset(FEATURES, [columns], "intent")  # a pause is no mask to learn
     with pytest.raises(HandrailError, match="steers"):
         PolicyInterface.of_dataset(FEATURES, [idle], "intent")
     with pytest.raises(HandrailError, match="policy interface"):
