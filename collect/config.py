@@ -232,11 +232,6 @@ class RecordConfig(SessionConfig, PolicyConfig, ExecutionConfig):
         check_file("--display_save", self.display_save, ".rrd")
 
     @property
-    def is_live(self) -> bool:
-        """Whether it runs by the wall clock."""
-        return OPERATORS.find(self.operator).interactive or self.realtime or bool(self.robot_client)
-
-    @property
     def processes(self) -> int:
         """How many processes share the work on this computer: as many as are asked for, or as pay."""
         pays = self.dataset.num_episodes >= WORTH_SHARING and not self._in_one_process

@@ -85,7 +85,7 @@ class Cockpit:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator; what was asked of the one before is over."""
-        self.person.reset(view, rng)  # what is heard now is not of the episode that is saved
+        self.person.over()
         self._listen()
         self.person.reset(view, rng)
 
@@ -217,7 +217,8 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     person = Person(env.model, build_modes(config, env), config.mode_name, supervises=bool(config.policy))
     server = open_server(config.cockpit, say)
     say(f"Episodes go to {config.dataset.folder}. To end: End recording on the page, or Ctrl-C here.")
-    refuses = ("undo",) if env.real else ()  # nothing that moved goes back by itself
+    no = {"undo": env.real, "lock": bool(config.policy)}  # what moved stays there; a policy moves every joint
+    refuses = [ask for ask, is_refused in no.items() if is_refused]
     return Cockpit(person, server, refuses, say, config)
 
 

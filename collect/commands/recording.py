@@ -171,10 +171,9 @@ def session_columns(config: RecordConfig) -> dict[str, Scalar]:
 def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     """Return the writer of a recording's dataset, new or resumed."""
     dataset, features = config.dataset, session_features(env, bool(config.policy))
-    manifest = Manifest(
-        dataset.name, dataset.fps, env.model.description.name, features, versions(*SIMULATION)
-    )
-    known = ROBOTS.get(manifest.robot_type)
+    robot = env.model.description.name
+    manifest = Manifest(dataset.name, dataset.fps, robot, features, versions(*SIMULATION))
+    known = ROBOTS.get(robot)
     if known and config.robot.endswith(".toml") and not known.file.samefile(os.path.expanduser(config.robot)):
         words = f"expected a name of its own, got {known.name!r}: policies would drive that robot"
         raise HandrailError(f"--robot {config.robot}: {words}")

@@ -75,6 +75,7 @@ class DeviceReader:
         is_open = False
         while not self._ended.is_set():
             try:
+                is_back = not is_open and self._tried.is_set()  # what is held then is no press, STOP is
                 if not is_open:
                     self.device.open()
                     self.trouble, is_open = "", True
@@ -82,7 +83,7 @@ class DeviceReader:
                 newest = self.device.read()
                 with self._lock:
                     self._newest = newest
-                    self._presses += newest.presses
+                    self._presses += [x for x in newest.presses if x in self.controls.stops or not is_back]
             except Exception as error:  # whatever a driver raises
                 self._lose(error)
                 self._close()

@@ -51,7 +51,7 @@ class Gamepad:
         known = [index for index in range(controllers.get_count()) if controllers.is_controller(index)]
         if not known:
             raise HandrailError(_why_none(controllers.get_count()))
-        self._pygame, self._pad, self._down = pygame, controllers.Controller(known[0]), frozenset(CONTROLS)
+        self._pygame, self._pad, self._down = pygame, controllers.Controller(known[0]), frozenset()
 
     def read(self) -> DeviceInput:
         """Return its sticks and buttons."""

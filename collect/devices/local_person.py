@@ -91,7 +91,7 @@ class LocalPerson:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator; what was pressed is over, STOP is not."""
-        self.person.reset(view, rng)  # what is heard now is not of the episode that is saved
+        self.person.over()
         self._heard()
         self._handle, self._card.brakes = None, ""
         self.person.reset(view, rng)
@@ -105,6 +105,7 @@ class LocalPerson:
 
     def between(self) -> EpisodeEvent | None:
         """Return what holds before an episode begins: QUIT; PAUSE in the e-stop, or if a device is gone."""
+        self.person.over()
         gone = None in self._heard()
         return self.person.between or (EpisodeEvent.PAUSE if gone else None)
 

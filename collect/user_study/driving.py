@@ -8,6 +8,7 @@ from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
+from handrail.collect.operators.person.inputs import Ask
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_env, build_modes
 from handrail.collect.session.outcome import Outcome
@@ -76,6 +77,9 @@ class Driving:
         """Run a trial, or one of practice, and return how it went."""
         assert self._cockpit
         assert self._recording
-        self._cockpit.person.practises = step.kind == "practice"
+        person = self._cockpit.person
+        person.practises = step.kind == "practice"
+        for ask in (Ask("mode", step.condition), Ask("lock", [])):  # as before every trial of this mode
+            person.ask(ask)
         self._recording.columns |= {"participant": self._name, "trial": step.trial}
         return self._recording.episode(seed, self._interrupts)

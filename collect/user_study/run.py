@@ -5,12 +5,14 @@ import time
 from collections.abc import Callable
 
 from handrail.collect.cockpit.cards import Cards
+from handrail.collect.cockpit.cockpit import NEEDED
 from handrail.collect.cockpit.process import open_server
 from handrail.collect.user_study.conduct import Conductor, Ending
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.driving import Driving
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
+from handrail.controllers.errors import check_installed
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.editing.merge import drop_episodes
@@ -62,7 +64,7 @@ def erase(folder: StudyFolder, name: str) -> str:
     who, trials = folder.participant(name), []
     who.keep(erasing=True)
     for _, _, root in folder.conditions:
-        if (root / "meta" / "handrail.json").exists():
+        if (root / "meta").is_dir():
             count = drop_episodes(root, lambda columns: columns.get("participant") == name)
             trials += [f"{count} of {root.relative_to(folder.root)}"] if count else []
     export(folder)
@@ -75,6 +77,7 @@ def erase(folder: StudyFolder, name: str) -> str:
 
 
 def _run(config: StudySessionConfig, folder: StudyFolder, say: Callable[[str], None]) -> None:
+    check_installed(*NEEDED)
     who = folder.welcome(config.participant)
     if folder.study.demo:
         say(folder.study.source)
@@ -85,13 +88,14 @@ def _run(config: StudySessionConfig, folder: StudyFolder, say: Callable[[str], N
     try:
         with Interrupts() as interrupts, Driving(folder, who.name, server, interrupts) as driving:
             ending = Conductor(folder, who, Cards(server), driving, say).run()
+            if ending is Ending.REFUSED:
+                erase(folder, who.name)
             time.sleep(_FAREWELL)
     finally:
         server.close()
+        export(folder)
     if ending is Ending.REFUSED:
-        erase(folder, who.name)
         say(f"{who.name} does not take part: nothing is kept")
         return
-    export(folder)
     again = f"; go on: handrail-user-study run {shlex.quote(str(folder.root))} {who.name}"
     say(f"{who.name}: {ending}" + (again if ending is Ending.PAUSED else f"; tables in {folder.exports}"))

@@ -25,16 +25,13 @@ class WholeBodyCompletion:
 
     Args:
         model: of the robot.
-        damping: λ.
-        weights: the diagonal of λ W² instead, (n,).
+        weights: the diagonal of λ W², (n,); by default λ is 0.01.
         length: that weighs as much as one radian [m]: L divides the translation by it.
     """
 
-    def __init__(
-        self, model: RobotModel, damping: float = 0.01, weights: FloatArray | None = None, length: float = 1.0
-    ) -> None:
+    def __init__(self, model: RobotModel, weights: FloatArray | None = None, length: float = 1.0) -> None:
         self._model, self._rows = model, np.repeat([1.0 / length, 1.0], 3)
-        usual = model.description.limits.velocity**2 / damping
+        usual = model.description.limits.velocity**2 / 0.01
         self._inverse = usual if weights is None else 1.0 / weights  # of λ W², (n,)
 
     def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:

@@ -51,10 +51,8 @@ def _capsule(points: FloatArray, axis: FloatArray) -> Fit:
         volume = float(np.pi * radius**2 * (2.0 * half + 4.0 / 3.0 * radius))
         return volume, {"capsule": radius + _AROUND} | ends
 
-    options = {"maxiter": 300}
-    return around(
-        minimize(lambda line: around(line)[0], np.zeros(4), method="Nelder-Mead", options=options).x
-    )
+    end = minimize(lambda line: around(line)[0], np.zeros(4), method="Nelder-Mead", options={"maxiter": 300})
+    return around(end.x)
 
 
 def pieces(triangles: FloatArray, cuts: int, share: float, least: float) -> list[FloatArray]:

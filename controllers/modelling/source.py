@@ -39,9 +39,7 @@ class Source:
         """
         names, links = list(read_urdf(self.arm).names)[1:], self._links()
         if strange := [frame for frame in frames.values() if frame not in links]:
-            raise HandrailError(
-                f"--hands {strange[0]}: expected a link of {self.urdf}: one of {', '.join(links)}"
-            )
+            raise HandrailError(f"--hands {strange[0]}: expected a link of {self.urdf}: {', '.join(links)}")
         if missing := sorted(set(more) - set(names)):
             raise HandrailError(f"--joints {missing[0]}: expected one of {', '.join(names)}")
         hands = {joint for frame in frames.values() for joint in chain([self.arm], frame)} & set(names)

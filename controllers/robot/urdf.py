@@ -116,9 +116,7 @@ def mesh_files(urdf: Path, folder: Path) -> Iterator[Path]:
         scheme = next((each for each in _INSIDE if name.startswith(each)), "")
         place = folder / name.removeprefix(scheme)
         if not scheme or not is_inside(place, folder):
-            raise HandrailError(
-                f"URDF {urdf}: mesh {name!r:.80}: expected package://PATH, a file in {folder}"
-            )
+            raise HandrailError(f"URDF {urdf}: mesh {name!r:.80}: expected package://PATH, file in {folder}")
         with restated(f"URDF {urdf}: mesh {name!r:.80}", OSError):
             yield regular(place)
 

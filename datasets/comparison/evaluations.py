@@ -75,10 +75,9 @@ class Policy:
 
     def run(self, outcome: str = SUCCESS) -> Run:
         """Return one outcome of all rollouts."""
-        read = OUTCOMES.get(outcome, lambda row: row[outcome])
-        seeds = tuple(sorted(self.rollouts))
-        values = np.array([float(read(self.rollouts[seed])) for seed in seeds])
-        return Run(self.draw, self.training_seed, seeds, values)
+        seeds, rows = zip(*sorted(self.rollouts.items()), strict=True)
+        values = [float(row[outcome] if outcome in row else OUTCOMES[outcome](row)) for row in rows]
+        return Run(self.draw, self.training_seed, seeds, np.array(values))
 
 
 @dataclass(frozen=True)

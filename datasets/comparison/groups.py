@@ -141,6 +141,4 @@ def _value(episode: Episode, by: str, root: str) -> str:
         return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
     if isinstance(episode, Demonstration) and by == "mode" and episode.has("mode"):
         return episode.modes or "none"
-    raise HandrailError(
-        f"dataset {root!r}: unknown column {by!r} of episodes, expected one of {', '.join(known)}"
-    )
+    raise HandrailError(f"dataset {root!r}: unknown column {by!r}, expected one of {', '.join(known)}")

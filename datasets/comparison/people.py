@@ -188,7 +188,8 @@ def _difference(one: Scenes, other: Scenes) -> float:
 
 def _within_reach(contrasts: Sequence[Contrast]) -> bool:
     """Return whether any difference could be detected: if all participants differ alike, p is 2¹⁻ⁿ."""
-    return any(each.tests * 2.0 ** (1 - each.counts[0]) < LEVEL for each in contrasts if each.interval)
+    tests = max((each.tests for each in contrasts), default=1)  # 1 also of a measure in which nobody differs
+    return any(tests * 2.0 ** (1 - each.counts[0]) < LEVEL for each in contrasts if each.interval)
 
 
 def _limits(

@@ -91,7 +91,8 @@ def _values(condition: Condition, resampled: FloatArray, rng: np.random.Generato
 
     `interval` of the success is Wilson's for these very policies, of as many rollouts as those in the same
     scenes are worth. `nested` is over dataset draw, training seed and evaluation seed: the wider of the
-    nested bootstrap's and Student's over replicates; of the success None for one replicate.
+    nested bootstrap's and Student's over replicates; None for one replicate, whose other outcomes have the
+    bootstrap's over its rollouts as `interval`.
     """
     for name in condition.outcomes:
         runs, success = condition.runs(name), name == SUCCESS
@@ -110,8 +111,8 @@ def _values(condition: Condition, resampled: FloatArray, rng: np.random.Generato
             scope=POLICIES,
             values=np.array([run.values.mean() for run in runs]),
             estimate=estimate,
-            interval=wilson(estimate * worth, worth) if success else None,
-            nested=None if success and len(means) < 2 else nested,
+            interval=wilson(estimate * worth, worth) if success else None if len(means) > 1 else nested,
+            nested=nested if len(means) > 1 else None,
             counts=(len(values),),
         )
 

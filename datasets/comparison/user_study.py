@@ -112,18 +112,18 @@ def read_trials(study: StudyData, scripted: Sequence[Path], columns: ColumnNames
     Returns:
         The trials, and how many episodes were left out since neither a participant nor a script is named.
     """
-    found: dict[str, list[tuple[str, Episode]]] = {}
+    found: dict[tuple[str, bool], list[tuple[str, Episode]]] = {}  # people have a scale of their own
     left_out = 0
     for (task, condition), root in study.datasets.items():
         for episode in recorded_episodes(root, columns):
             if _participant(episode) or episode.meta.get("operator") == SCRIPTED:
-                found.setdefault(task, []).append((condition, episode))
+                found.setdefault((task, bool(_participant(episode))), []).append((condition, episode))
             else:
                 left_out += 1
     for episode in (episode for root in scripted for episode in recorded_episodes(root, columns)):
         task, condition = _task_and_mode(episode)
-        found.setdefault(task, []).append((condition, episode))
-    return [trial for task, episodes in found.items() for trial in _measured(task, episodes)], left_out
+        found.setdefault((task, False), []).append((condition, episode))
+    return [trial for (task, _), episodes in found.items() for trial in _measured(task, episodes)], left_out
 
 
 def _participant(episode: Episode) -> str:
@@ -133,9 +133,9 @@ def _participant(episode: Episode) -> str:
 def _task_and_mode(episode: Episode) -> tuple[str, str]:
     """Return task and mode of an episode of a dataset that is no part of the study."""
     where = f"dataset {str(episode.info.root)!r}, episode {episode.number}"
-    if _participant(episode):
+    if (operator := episode.meta.get("operator")) != SCRIPTED or _participant(episode):
         raise HandrailError(
-            f"{where}: expected a scripted operator, got participant {_participant(episode)!r};"
+            f"{where}: expected a scripted operator, got {_participant(episode) or operator!r};"
             " a study's own datasets are found in --study"
         )
     task, mode = (str(episode.meta.get(name) or "") for name in ("environment", "mode"))

@@ -47,9 +47,7 @@ class EditConfig:
         """Check what can be checked without reading anything."""
         if bool(self.output) == self.in_place:
             got = "both" if self.in_place else "neither"
-            raise HandrailError(
-                f"{self.verb}: expected --output FOLDER for a new dataset, or --in_place; got {got}"
-            )
+            raise HandrailError(f"{self.verb}: expected --output NEW_FOLDER or --in_place, got {got}")
         if self.output and self.target == self.root:
             raise HandrailError(f"--output {self.output}: expected a folder apart from {self.root}")
         for name in self.needed:

@@ -108,8 +108,8 @@ def moving_stretch(episode: Demonstration, margin: float) -> tuple[int, int]:
     if not moved.size or not away.size:
         return 0, count
     spare = round(margin * episode.fps)
-    first = max(0, int(moved[0]) - spare)
     done = np.flatnonzero(episode.frames.get(_SUCCESS, ()))[:1]
+    first = max(0, min([int(moved[0]) - spare, *done.tolist()]))
     end = max(min(count, int(away[-1]) + 2 + spare), *(int(frame) + 1 for frame in done), 0)
     if end <= first:
         return 0, count

@@ -77,11 +77,9 @@ def read_manifest(layout: Layout) -> Manifest:
                 f"expected format {FORMAT}, got {str(content['format'])[:60]}; a newer Handrail wrote it"
             )
         said = msgspec.convert(content, _ManifestFile)
-        manifest = Manifest(
-            said.repo_id, said.fps, said.robot_type, features_of(said.features), said.versions
-        )
-        manifest.check()
-        return manifest
+        found = Manifest(said.repo_id, said.fps, said.robot_type, features_of(said.features), said.versions)
+        found.check()
+        return found
     except (FileNotFoundError, NotADirectoryError) as error:
         got = "a folder without one" if layout.root.is_dir() else "no folder"
         if layout.info.exists():

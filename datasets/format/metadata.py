@@ -135,8 +135,6 @@ def fit_columns(columns: Mapping[str, Scalar | None], types: ColumnTypes) -> dic
         elif kind == pa.float64() and type(value) is int:
             value = float(value)
         elif _TYPES[type(value)] != kind:
-            raise HandrailError(
-                f"episode column {name!r}: expected {kind} as in earlier episodes, got {value!r}"
-            )
+            raise HandrailError(f"episode column {name!r}: expected {kind} as before, got {value!r}")
         found[name] = value
     return found

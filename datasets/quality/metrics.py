@@ -53,7 +53,7 @@ def ldlj(speed: np.ndarray, fs: float) -> float:
         The measure (minimum jerk: about −5.3), or NaN if nothing moves or there are fewer than three samples.
     """
     jerk = np.diff(speed, 2) * fs**2
-    if not _moves(speed) or not jerk.any():
+    if not _moves(speed) or not jerk.any() or np.ptp(speed) <= 1e-4 * np.abs(speed).max():  # even
         return float("nan")
     duration, peak = len(speed) / fs, np.abs(speed).max()
     return -float(np.log(duration**3 / peak**2 * (jerk @ jerk) / fs))

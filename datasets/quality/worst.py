@@ -45,9 +45,7 @@ def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]
     episodes = some_recorded(root)
     measured = measure({"": episodes}, np.random.default_rng(0), metrics=[metric]).values[metric.name][""]
     if measured.estimate is None:
-        raise HandrailError(
-            f"--worst {metric.name}: expected a value of an episode, got none: {measured.reason}"
-        )
+        raise HandrailError(f"--worst {metric.name}: expected a value, got none: {measured.reason}")
     return ranked(episodes, metric, measured.values)[:count]
 
 

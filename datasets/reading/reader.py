@@ -232,10 +232,11 @@ def with_success(info: DatasetInfo, rows: Sequence[dict[str, Any]]) -> list[dict
 def _values(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
     if feature.dtype == "string":
         return np.array([value or "" for value in column.to_pylist()], dtype=str)
-    if column.null_count and feature.number.kind != "f":
-        raise ValueError(f"{column.null_count} rows without a value where {feature.dtype} is expected")
+    values = flat_numbers(column)
+    if feature.number.kind != "f" and (column.null_count or np.isnan(values).any()):
+        raise ValueError(f"{column.null_count or 'some'} rows without a value, expected {feature.dtype}")
     shape = () if feature.is_scalar else feature.shape
-    return flat_numbers(column).astype(feature.dtype).reshape(len(column), *shape)
+    return values.astype(feature.dtype).reshape(len(column), *shape)
 
 
 def _torn(path: Path, error: Exception, advice: str = _DAMAGED) -> HandrailError:

@@ -55,8 +55,9 @@ from handrail.datasets.storage.lock import FolderLock
 class EpisodeWriter:
     """Adds episodes to one dataset; get one from `create` or `resume`, close it, or use it in a `with`.
 
-    Every error is a `HandrailError` with one line. After an error in `add_frame` the frame is not in; after
-    one in `save_episode` the episode is gone, the saved ones are whole, and the next may be recorded.
+    Every error is a `HandrailError` with one line. After an error in `add_frame` the frame is not in. After
+    one in `save_episode` the saved episodes are whole, and the next may be recorded; this one is gone, but
+    where its columns were refused: then it is still open, to be saved with others, or discarded.
     """
 
     def __init__(

@@ -73,7 +73,7 @@ class StudyProgress:
             return last is not None and int(last.name) == noted.get("steps")
         root = self.layout.dataset(job.cell)
         try:
-            return read_info(root).episodes >= noted.get("episodes", 1) and any(root.glob("data/*/*.parquet"))
+            return read_info(root).episodes == noted.get("episodes") and any(root.glob("data/*/*.parquet"))
         except HandrailError:
             return False
 

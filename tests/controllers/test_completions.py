@@ -78,7 +78,7 @@ def test_a_twist_means_the_same_as_in_the_mpc(q, twist, frame, point):
 def test_damped_least_squares_is_the_optimum(q, twist, base):
     """The gradient of ‖J v − e‖² + λ‖W v‖² is 0: of all joints; of the arm's, whatever the base does."""
     damping, jacobian = 0.01, MODEL.jacobian(q)
-    whole = WholeBodyCompletion(MODEL, damping)(q, REST, twist, STEP)
+    whole = WholeBodyCompletion(MODEL)(q, REST, twist, STEP)
     arm = ArmCompletion(MODEL, damping).arm_velocity(q, base, twist)
     for v, joints in ((whole, slice(9)), (np.concatenate([base, arm]), slice(3, 9))):
         gradient = jacobian.T @ (jacobian @ v - twist) + damping * v / LIMITS.velocity**2
@@ -183,7 +183,7 @@ def test_an_arm_without_a_base_completes_too():
     base = replace(MODEL.description.base, kind="fixed")
     arm = RobotModel(replace(MODEL.description, base=base, home=HOME[3:], limits=of_the_arm))
     twist = np.array([0.02, 0.01, 0.02, 0.0, 0.0, 0.0])
-    for complete in (WholeBodyCompletion(arm, 1e-4), BaseFollowingCompletion(arm)):
+    for complete in (WholeBodyCompletion(arm, np.full(6, 1e-4)), BaseFollowingCompletion(arm)):
         v = complete(HOME[3:], np.zeros(6), twist, STEP)
         assert v.shape == (6,)
         assert (arm.jacobian(HOME[3:]) @ v) @ twist > 0

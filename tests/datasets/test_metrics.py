@@ -53,6 +53,11 @@ def test_no_motion_has_no_smoothness(speed):
     assert np.isnan(ldlj(np.asarray(speed), 50.0))
 
 
+def test_an_even_motion_has_no_smoothness_but_its_rounding():
+    places = np.float32(0.1) * np.arange(99, dtype=np.float32)
+    assert np.isnan(ldlj(np.abs(np.diff(places)).astype(float) * 20.0, 20.0))
+
+
 def test_path_length():
     angle = np.linspace(0, 2 * np.pi, 1001)
     assert path_length(np.column_stack([np.cos(angle), np.sin(angle)])) == pytest.approx(2 * np.pi, rel=1e-4)

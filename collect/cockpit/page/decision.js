@@ -21,7 +21,7 @@ export class Decision {
 
   frame(frame) {
     this.now = frame;
-    if (frame.phase === "ready") this.close();
+    if (frame.phase === "ready" && this.close() && this.ends) this.ask("quit"); // it was judged and saved meanwhile
   }
 
   get isOpen() {

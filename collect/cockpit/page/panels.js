@@ -47,6 +47,7 @@ export class Panels {
   }
 
   locks(stage) {
+    byId("locks").parentElement.hidden = stage.refuses.includes("lock");
     byId("locks").replaceChildren(...stage.joints.map((name, index) => {
       const label = document.createElement("label"), box = document.createElement("input");
       box.type = "checkbox";

@@ -83,17 +83,21 @@ class Person:
         self._event: EpisodeEvent | None = None
         self._quits = False  # once the episode that was judged is saved
         self._armed = False  # everything was let go once since the robot had to brake
-        self._begun = False  # Start was pressed in this episode
+        self._begun = False  # somebody has driven in this episode
         self._slept = _slept()  # so far, as is known [s]
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
+        self.over()
+        self._find(view)
+
+    def over(self) -> None:
+        """Take note that the episode before is over: what is asked from now on is not of it."""
         self.setting = replace(self.setting, axis=-1, switches=0)
         self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.READY
         quits = self.between is EpisodeEvent.QUIT
         self._event, self._quits = EpisodeEvent.QUIT if quits else None, False
         self._armed = self._begun = False
-        self._find(view)
 
     def take(self, inputs: Input, received: float, round_trip: float = 0.0) -> None:
         """Take where the inputs are now.
@@ -132,7 +136,7 @@ class Person:
                 released = Phase.PAUSED if self._begun else Phase.READY
                 self.phase, self._armed = (Phase.STOPPED if value else released), False
             case "start" if self.phase in (Phase.READY, Phase.PAUSED):
-                self.phase, self._armed, self._begun = Phase.DRIVING, False, True
+                self.phase, self._armed = Phase.DRIVING, False
             case "pause" if self.phase in (Phase.DRIVING, Phase.LOST):
                 self.phase = Phase.PAUSED
             case "practice" if not self._begun:
@@ -151,12 +155,13 @@ class Person:
                 self.setting = replace(setting, frame=value)
             case "speed":
                 self.setting = replace(setting, speed=max(value, 0.05))
-            case "lock" if self._lost is Phase.LOST:  # a policy would move them
+            case "lock":
                 locked = sorted(set(value) & set(range(len(channels.joints))))
                 self.setting = setting.switched(locked=tuple(locked))
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
+        self._begun |= self.phase is Phase.DRIVING
         if (slept := _slept()) > self._slept + DEAD_MAN_TIME:  # who wakes a computer may not see the robot
             self._slept = slept
             self.lose()
@@ -210,9 +215,9 @@ class Person:
         """End the episode, once it has begun; one that runs is paused before it is quit."""
         if event is EpisodeEvent.QUIT and self._event is not None and self._event.judges:
             self._quits = True
-        elif event is EpisodeEvent.QUIT and self.phase in (Phase.DRIVING, Phase.LOST):
+        elif event is EpisodeEvent.QUIT and self._begun and self.phase in (Phase.DRIVING, Phase.LOST):
             self.phase = Phase.PAUSED
-        elif self._begun or event.drops:
+        elif self._event is not EpisodeEvent.QUIT and (self._begun or event.drops):
             self._event = event
             self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.PAUSED
 

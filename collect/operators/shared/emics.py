@@ -14,7 +14,6 @@ expert is the policy, on whatever channels it owns. docs/takeover.md says what e
 """
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -52,22 +51,6 @@ class RunningMean:
         known = np.where(np.isfinite(value), value, self._mean)
         self._mean = self._mean + (1.0 - np.exp(-passed / self._window)) * (known - self._mean)
         return self._mean
-
-
-class Criterion(Protocol):
-    """Says who shall drive, from what it sees."""
-
-    def reset(self) -> None:
-        """Begin an episode."""
-
-    def wants(self, level: str, wishes: Wishes) -> str | None:
-        """Return who shall drive, `PERSON` or `POLICY`; None where it does not mind.
-
-        Args:
-            level: who drives now.
-            wishes: of this moment.
-        """
-        ...
 
 
 class Performance:
@@ -154,6 +137,10 @@ class Purpose:
         return PERSON if moved.any() and steady else None
 
 
+Criterion = Performance | Availability | Purpose
+"""Says who shall drive, from what it sees."""
+
+
 class LevelSwitcher:
     """One of both drives the whole robot: the policy at first.
 
@@ -168,7 +155,12 @@ class LevelSwitcher:
         criteria: the most critical first.
     """
 
-    def __init__(self, groups: Groups, settings: ArbiterSettings, criteria: Sequence[Criterion]) -> None:
+    def __init__(
+        self,
+        groups: Groups,
+        settings: ArbiterSettings,
+        criteria: Sequence[Performance | Availability | Purpose],
+    ) -> None:
         self._groups, self._lately = groups, Lately(groups, settings)
         self._dwell, self._criteria = settings.dwell, criteria
         self.reset()

@@ -78,7 +78,8 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     settings = check_policy_folder(place)
     where = f"--policy {place}"
     meta = read_meta(place) if (place / NAME).is_file() else _plain(place, settings, config)
-    for asked, own, known in ((config.task, meta.environment, TASKS), (config.robot, meta.robot, ROBOTS)):
+    task, hands = (config.task, meta.environment, TASKS), {meta.hand} - {"", MIXED}
+    for asked, own, known in (task, (config.robot, meta.robot, ROBOTS), (config.hand, meta.hand, hands)):
         if asked and own in known and own != asked:
             raise HandrailError(f"{where}: expected one trained for {asked}, got {own!r}")
     TASKS.admit(meta.environment, (config.task,))  # before anything that a policy names is imported
@@ -93,7 +94,7 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
             raise HandrailError(f"{where}: expected --robot and --task: neither it nor its dataset says them")
         meta = replace(meta, environment=task)
         own = len(AgentObservation(load_model(robot)).names)  # more: robot and scene, of lerobot-record
-        if config.mode and not meta.mode and sizes.get(STATE) != own:
+        if config.mode and not meta.mode and sizes.get(STATE, own) != own:
             meta = replace(meta, mode=config.mode, actions="intent")
     meta = replace(meta, robot=robot or meta.robot, hand=config.hand or meta.hand)
     if meta.hand == MIXED:

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 
 from handrail.collect.config import RecordConfig
+from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES, TeleopMode
 from handrail.collect.operators.operator import Operator, View
 from handrail.collect.operators.scripted.steering import Gains, full_stick
@@ -54,7 +55,7 @@ def share(config: RecordConfig, person: Operator, env: HandrailEnv) -> SharedOpe
     if len(members) > 1:
         gains = Gains().within(env.model.description.world)
         planner = Ensemble(members, full_stick(channels, gains))
-    if config.is_live:
+    if OPERATORS.find(config.operator).interactive or config.realtime or config.robot_client:
         planner = ThreadedPlanner(planner, env.period)
     groups = Groups(channels)
     arbiter = resolved(ARBITERS.find(config.arbiter).build)(groups, config.arbitration)

@@ -55,9 +55,7 @@ class EvaluationFile:
                 raise HandrailError(f"{where}: expected task {task}, got {checkpoint.meta.environment}")
             here = condition.conditions
             if (before := told.setdefault(label, here)) != here:
-                raise HandrailError(
-                    f"{where}: expected {before}, got {here}; run it apart, by another --label"
-                )
+                raise HandrailError(f"{where}: expected {before}, got {here}; evaluate it by another --label")
             if any(entry.get("checkpoint") != checkpoint.digest for entry in self._entries(condition)):
                 raise HandrailError(f"{where}: has another policy of dataset draw, seed {checkpoint.key}")
 

@@ -19,7 +19,7 @@ from msgspec import Meta
 from handrail.collect.config import FPS_RANGE, MOST_TIME
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.regular_file import is_inside
-from handrail.controllers.typed import Count, Name, NonNegative, Number, decoded
+from handrail.controllers.typed import Count, Name, NonNegative, decoded
 from handrail.datasets.storage.atomic import remove, sync, write_whole
 from handrail.datasets.storage.strict_json import load_json
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -89,7 +89,7 @@ class PolicyMeta:
     """Height and width of the pictures that its encoder reads [px], by camera."""
     hand: Name = ""
     """Which of several hands does the task; "mixed" if several did, "" of one hand."""
-    validation: Mapping[Annotated[str, Meta(pattern=r"\A[0-9]+\Z")], Number] = field(default_factory=dict)
+    validation: Mapping[Annotated[str, Meta(pattern=r"\A[0-9]+\Z")], float] = field(default_factory=dict)
     """Loss on the episodes that were held out, by update."""
     task: str = ""
     """The one sentence that says what is done in its episodes; "" of several, or if they do not say."""

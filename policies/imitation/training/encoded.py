@@ -62,9 +62,7 @@ def _read(info: DatasetInfo, row: Mapping[str, Any], states: FloatArray, encoder
         words = f"expected where things are, or pictures of {', '.join(encoder.reads.cameras)}"
         raise HandrailError(f"dataset {str(info.root)!r}: {words}; found none of {missing[0]}")
     if missing := [name for name in encoder.reads.cameras if not info.features[PICTURE + name].is_video]:
-        raise HandrailError(
-            f"dataset {str(info.root)!r}: expected a video of {missing[0]}, found single pictures"
-        )
+        raise HandrailError(f"dataset {str(info.root)!r}: expected a video of {missing[0]}, got pictures")
     videos, numbers = {name: _pictures(info, row, PICTURE + name) for name in encoder.reads.cameras}, []
     with threads(1):  # a few pictures are too little to share
         for start in range(0, row["length"], _AT_ONCE):

@@ -22,6 +22,7 @@ from handrail.collect.session.build import build_controller, build_env, build_mo
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.catalogue import TASKS
+from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import fitting
 from handrail.controllers.robot.description import load_description
@@ -72,7 +73,11 @@ class TrialsConfig(ReportConfig, ExecutionConfig):
     @property
     def mode_names(self) -> tuple[str, ...]:
         """The modes asked for."""
-        return names(self.modes, fitting(MODES, len(load_description(self.robot).hands)))
+        robot = load_description(self.robot)
+        fit = fitting(MODES, len(robot.hands)).items()
+        return names(
+            self.modes, [name for name, each in fit if CONTROLLERS.find(each.controller).fits(robot)]
+        )
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""

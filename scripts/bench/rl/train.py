@@ -63,6 +63,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
         model = new_model(config)
         if config.start_from:
             model.start_from(Path(config.start_from).expanduser())
+        model.write(config.folder)  # what crashes before the first evaluation goes on, too
     _learn(config, model)
     last = sorted((config.folder / "actors").glob("*.npz"))[-config.average :]
     actor = Actor.mean([Actor.load(path) for path in last])

@@ -15,13 +15,14 @@ import tyro
 from msgspec import Meta
 
 from handrail.collect.flags import check_file
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, check_known
 from handrail.controllers.typed import Count, check_settings
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.scripts.bench.soak.child import hear_signals
+from handrail.scripts.bench.soak.faults import FAULTS
 from handrail.scripts.bench.soak.notes import ROUNDS, next_number, note, write_tables
 from handrail.scripts.bench.soak.rounds import run_round
-from handrail.scripts.bench.soak.work import Workshop
+from handrail.scripts.bench.soak.work import KINDS, Workshop
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,11 @@ class SoakConfig:
         """Check the settings."""
         check_settings(self, "--")
         check_file("--page", self.page, ".md")
+        check_known("--work", [self.work] if self.work else [], KINDS)
+        if not any(self.fault in each.name and each.is_possible for each in FAULTS):
+            raise HandrailError(
+                f"--fault {self.fault}: expected a part of a name in faults.py, possible here"
+            )
         if self.folder.is_file():
             raise HandrailError(f"OUTPUT {self.output}: expected a folder, found a file")
 

@@ -39,7 +39,7 @@ _EDITS = {  # command, `{0}` for the folder; the name there of its result
     "edit trim": ("edit trim {0}/d --in_place", "d"),
     "edit keep": ("edit keep {0}/d --episodes 2-5 --output {0}/n", "n"),
 }
-_KINDS = {"record": 5, "record_2": 4, "resume": 2, "packed": 2, "edit": 4, "evaluate": 1, "replay": 1}
+KINDS = {"record": 5, "record_2": 4, "resume": 2, "packed": 2, "edit": 4, "evaluate": 1, "replay": 1}
 
 
 class Workshop:
@@ -213,7 +213,7 @@ def _record(recipe: str) -> str:
 def _work(
     folder: Path, workshop: Workshop, rng: np.random.Generator, workers: bool, only: str, recipe: str
 ) -> Work:
-    kinds = {only: 1} if only else {"record_2": 5, "evaluate": 1} if workers else _KINDS
+    kinds = {only: 1} if only else {"record_2": 5, "evaluate": 1} if workers else KINDS
     share = np.array(list(kinds.values()), float)
     kind = str(rng.choice(list(kinds), p=share / share.sum()))
     shared = " --workers 2" if workers or kind == "record_2" or rng.random() < 0.2 else ""

@@ -108,7 +108,8 @@ def _pink(loop: TimingLoop) -> Take:
     model, limits = loop.model.pinocchio.copy(), loop.model.description.limits
     model.lowerPositionLimit, model.upperPositionLimit = limits.position_lower, limits.position_upper
     model.velocityLimit = limits.velocity
-    task = pink.FrameTask("tool", position_cost=1.0, orientation_cost=1.0)
+    tool = loop.model.hand.named("tool")
+    task = pink.FrameTask(tool, position_cost=1.0, orientation_cost=1.0)
     tasks = [task, pink.tasks.DampingTask(cost=0.01)]
     twist = Channels.of(loop.model.description).hand_slice()
     among: Any = None
@@ -128,7 +129,7 @@ def _pink(loop: TimingLoop) -> Take:
 
         def solve() -> FloatArray | None:
             configuration.update(update.state.q)
-            here = configuration.get_transform_frame_to_world("tool")
+            here = configuration.get_transform_frame_to_world(tool)
             moved = PERIOD * update.intent.values[twist]
             target = pin.SE3(pin.exp3(moved[3:]) @ here.rotation, here.translation + moved[:3])
             task.set_target(target)

@@ -53,10 +53,12 @@ def opened(monkeypatch):
     monkeypatch.setattr(Strain, "picture_period", 0.0)
     with environment("Reach") as env:
 
-        def made(real=False, begins=True):
+        def made(real=False, begins=True, policy=()):
             env.reset(seed=3)
             monkeypatch.setattr(env, "real", real)
-            config = RecordConfig(task="reach", mode="ee", dataset=DatasetConfig(place="somewhere"))
+            config = RecordConfig(
+                task="reach", mode="ee", policy=policy, dataset=DatasetConfig(place="somewhere")
+            )
             person = cockpit.open_cockpit(config, env, lambda words: None)
             view = View(env.plant.state(), env.task_state())
             person.begin(env, 3)
@@ -86,6 +88,17 @@ def test_what_is_pressed_before_the_first_episode_is_no_error(opened):
     person.reset(view, np.random.default_rng(0))
     assert person.person.closed == [0.0]
     assert person.act(view) is EpisodeEvent.QUIT
+
+
+def test_beside_a_policy_no_joint_is_held_still(opened):
+    """The policy would move it: the page does not offer it."""
+    for policy in (), ("some/folder",):
+        person, server, view = opened(policy=policy)
+        said = [(Kind.ASK, {"what": "lock", "value": [3]})]
+        server.receive = lambda waiting=said: [waiting.pop()] if waiting else []
+        person.act(view)
+        assert person.person.setting.locked == (() if policy else (3,))
+        assert server.of(Kind.STAGE)[-1]["refuses"] == (["lock"] if policy else [])
 
 
 def shade(jpeg):

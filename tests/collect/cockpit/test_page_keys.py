@@ -232,6 +232,23 @@ def test_only_who_may_say_done_is_asked_whether_it_is(on_bench, refuses, asked, 
     assert driver.page.evaluate(script, list(refuses)) == [asked, is_open]
 
 
+def test_the_end_is_asked_for_though_the_episode_was_over_meanwhile(on_bench):
+    """The newest picture was of the episode that was being saved: the box opened, and closes by itself."""
+    script = """async () => {
+      const { Decision } = await import("./decision.js"), asked = [];
+      const made = new Decision((what) => asked.push(what), () => "");
+      made.stage({ refuses: [] });
+      for (const act of ["quit", "success"]) {
+        made.frame({ phase: "driving", practice: false, judge: false });
+        made[act]();
+        made.frame({ phase: "ready", practice: false, judge: false });
+      }
+      return [asked, made.isOpen];
+    }"""
+    _, driver = on_bench()
+    assert driver.page.evaluate(script) == [["pause", "quit", "pause"], False]
+
+
 @pytest.mark.parametrize("refuses", [(), ("lock", "mask")])
 def test_a_refused_mask_cannot_be_asked_for(on_bench, refuses):
     script = """async (refuses) => {

@@ -110,6 +110,17 @@ def test_a_stop_before_it_was_gone_is_handed_on_once(device):
     reader.close()
 
 
+def test_what_is_held_when_it_comes_back_is_no_press_but_a_stop_is(device):
+    controls = ControlMap({"hand": {"red": ("ee.vx", 1)}}, {"red": "stop", "green": "success"})
+    reader = DeviceReader(device, controls, retry=0.01)
+    reader.start()
+    device.trouble = HandrailError("lever: unplugged")
+    eventually(lambda: reader.trouble)
+    device.readings, device.trouble = [DeviceInput(0.0, presses=("green", "red"))], None
+    eventually(lambda: reader.input(Steered(hand=True, base=False))[1] == ("stop",))
+    reader.close()
+
+
 @pytest.mark.parametrize("error", [HandrailError("lever: expected one, found none"), OSError("no such port")])
 def test_one_that_cannot_be_opened_at_first_is_refused_in_one_line(device, poller, error):
     device.trouble = error

@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from user_study_helpers import study_folder
 
 from handrail.collect.user_study import design, run
+from handrail.collect.user_study.conduct import Ending
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.design import UserStudy
 from handrail.collect.user_study.folder import StudyFolder
@@ -109,3 +111,50 @@ def test_a_participant_under_other_versions_is_said(tmp_path, monkeypatch, capsy
         said = " ".join(capsys.readouterr().err.split())
         expected = f"other versions than at the study's beginning: numpy {np.__version__} (was 1.2.3)"
         assert (expected in said) == ("other versions" in said) == bool(changed)
+
+
+def ran(monkeypatch, folder, what):
+    """Run a session whose conductor says or raises something."""
+
+    class Fake:
+        def __init__(self, *_):
+            pass
+
+        def run(self):
+            if isinstance(what, BaseException):
+                raise what
+            return what
+
+        def close(self):
+            pass
+
+    for name in ("open_server", "Conductor", "Cards"):
+        monkeypatch.setattr(run, name, Fake)
+    monkeypatch.setattr(run, "Driving", lambda *_: nullcontext())
+    run.study_session(StudySessionConfig("run", str(folder), "P001"))
+
+
+def test_a_refusal_that_is_interrupted_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(seconds):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run.time, "sleep", interrupted)
+    study_folder(tmp_path).freeze()
+    with pytest.raises(KeyboardInterrupt):
+        ran(monkeypatch, tmp_path, Ending.REFUSED)
+    assert not list((tmp_path / "participants").iterdir())
+
+
+def test_an_interrupt_leaves_tables_of_all_that_was_said(tmp_path, monkeypatch):
+    study_folder(tmp_path).freeze()
+    with pytest.raises(KeyboardInterrupt):
+        ran(monkeypatch, tmp_path, KeyboardInterrupt())
+    assert (tmp_path / "exports" / "scores.csv").exists()
+
+
+def test_without_the_extra_no_study_begins(tmp_path, monkeypatch):
+    monkeypatch.setattr(run, "NEEDED", ("the cockpit", ("no_such_package",), "cockpit"))
+    study_folder(tmp_path).freeze()
+    with pytest.raises(HandrailError, match="no_such_package"):
+        ran(monkeypatch, tmp_path, Ending.DONE)
+    assert not (tmp_path / "participants" / "P001").exists()

@@ -24,7 +24,7 @@ class StoppingServer:
         self.asked += 1
         if self.asked == 1:  # while the trial is made
             return []
-        messages, self.unread = self.unread, []
+        messages, self.unread = self.unread[:1], self.unread[1:]  # one a period
         return messages or [(Kind.STILL, {"what": "failure", "value": True})]
 
     def send(self, *message, **more):
@@ -73,3 +73,19 @@ def test_a_mask_that_is_locked_is_changed_by_nothing(what, allow, tmp_path):
     owned = {name for name, own in zip(person.meaning.channels.names, mask, strict=True) if own}
     assert (owned == set(briefing.channels)) == (not allow)
     assert person.setting.switches == len(allow)
+
+
+def test_every_trial_begins_in_its_mode_with_no_joint_held(tmp_path):
+    """Whatever was chosen in the trial before."""
+    server = StoppingServer(("mode", "direct"), ("lock", [3]))
+    folder = study_folder(tmp_path, allow=["mode", "mask"])
+    with Interrupts() as interrupts, SeenDriving(folder, "P001", server, interrupts) as driving:
+        driving.prepare("ee", "reach")
+        step = Step("practice", "ee", "reach")
+        driving.run(step, 3)
+        assert driving.person.setting.mode.name == "direct"
+        server.unread = [(Kind.ASK, {"what": what, "value": what == "start"}) for what in ("stop", "start")]
+        server.asked = 0
+        driving.run(step, 4)
+        setting = driving.person.setting
+    assert (setting.mode.name, setting.locked, setting.switches) == ("ee", (), 0)

@@ -147,3 +147,13 @@ def test_an_erasure_that_cannot_remove_the_old_files_is_not_done(tmp_path, monke
     monkeypatch.undo()
     assert "erased P001" in erased(folder, "P001")
     assert not list(tmp_path.rglob(".*.replaced"))
+
+
+def test_nobody_is_erased_whose_episodes_cannot_be(two, tmp_path):
+    """A file of the dataset is gone: it would be passed over, and the episodes would stay."""
+    shutil.copytree(two.root, tmp_path / "study")
+    folder = type(two)(tmp_path / "study")
+    (folder.root / "data" / "reach" / "ee" / "meta" / "handrail.json").unlink()
+    with pytest.raises(HandrailError, match="was not written by Handrail"):
+        erased(folder, "P001")
+    assert "P001" in folder.participants()

@@ -13,12 +13,12 @@ from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
 
 MESHES = {
-    "/etc/passwd": "expected package://PATH, a file in",
-    "file:///etc/passwd": "expected package://PATH, a file in",
-    "arm.stl": "expected package://PATH, a file in",
-    "package://../arm.stl": "expected package://PATH, a file in",
-    "package://a/../../arm.stl": "expected package://PATH, a file in",
-    "package://out.stl": "expected package://PATH, a file in",
+    "/etc/passwd": "expected package://PATH, file in",
+    "file:///etc/passwd": "expected package://PATH, file in",
+    "arm.stl": "expected package://PATH, file in",
+    "package://../arm.stl": "expected package://PATH, file in",
+    "package://a/../../arm.stl": "expected package://PATH, file in",
+    "package://out.stl": "expected package://PATH, file in",
     "package://none.stl": "No such file",
     "package://pipe.stl": "found a named pipe",
     "package://nan.stl": "expected finite coordinates",

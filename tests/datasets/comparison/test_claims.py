@@ -45,6 +45,22 @@ def test_a_policy_with_more_rollouts_counts_as_any_other():
     assert not difference.detected
 
 
+def test_one_policy_says_nothing_of_training():
+    """Of no outcome; its rollouts have their own interval."""
+    runs = [Run(0, 0, tuple(range(60)), (np.arange(60) % 2).astype(float))]
+    found = judge({"a": condition("a", runs, contacts=True), "b": condition("b", runs)}, "b", rng(3))
+    alone = [value for value in found.values if value.label == "a"]
+    assert {value.measure.name for value in alone} >= {"contacts"}
+    assert all(value.interval and value.nested is None for value in alone)
+
+
+def test_a_number_of_a_rollout_is_that_number():
+    """`contact` and `clean` are ours only where another program does not say its own."""
+    rollouts = {seed: {"success": 1.0, "contact": 3.5, "clean": 0.25} for seed in range(4)}
+    policy = Policy(0, 0, {}, rollouts)
+    assert [policy.run(name).values.tolist() for name in ("contact", "clean")] == [[3.5] * 4, [0.25] * 4]
+
+
 def attempts(label, count, share, seconds):
     """Return episodes of one length, some of them successful."""
     meta = ({"length": 20 * seconds, "tasks": ["go"], "success": k < share * count} for k in range(count))

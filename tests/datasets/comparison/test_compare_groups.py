@@ -30,7 +30,7 @@ def test_modes_of_one_dataset(tmp_path):
     assert [group.label for group in groups] == ["both · ee", "other · joints"]
     with pytest.raises(HandrailError, match="expected 2 to 8 groups of episodes, got ee"):
         load_groups([str(root)], "mode")
-    with pytest.raises(HandrailError, match=r"unknown column 'colour' of episodes, expected one of .*mode"):
+    with pytest.raises(HandrailError, match=r"unknown column 'colour', expected one of .*mode"):
         load_groups([str(root)], "colour")
 
 

@@ -43,7 +43,7 @@ def frame(mode, index, device, undos=0):
     return {
         "observation.state": np.array([0.01 * index, 0.0, 0.0]),
         "action": np.array([0.3, 0.0]),
-        "teleop.raw": np.array([np.sign(np.sin(0.5 * index)), 0.0]),
+        "teleop.raw": np.array([np.sign(np.sin(0.5 * index)) * (1.0 if device else 30.0), 0.0]),
         "teleop.mask": np.array([True, False, True]),
         "teleop.mode": mode,
         "teleop.device": device,
@@ -133,8 +133,11 @@ def test_p_is_that_of_all_swaps_of_signs(six):
     assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
 
 
-def test_too_few_participants_are_said(six):
-    assert any("Too few to detect any difference" in text for text in people_report(six[1]).cautions)
+def test_too_few_participants_are_said(six, tmp_path):
+    without_scores = shutil.copytree(six[0], tmp_path / "six")
+    shutil.rmtree(without_scores / "exports")
+    for found in six[1], compare_people(CompareConfig(study=str(without_scores), baseline="ee")):
+        assert any("Too few to detect any difference" in text for text in people_report(found).cautions)
     assert not any(each.detected for each in six[1].contrasts if each.scope == "reach")
     nine = {f"P{n}": {None: [float(n)]} for n in range(9)}
     more = {name: {None: [50.0 + value[None][0] ** 2]} for name, value in nine.items()}
@@ -203,8 +206,8 @@ def test_scripted_operators_stand_beside_people_and_are_not_tested(six, tmp_path
     times = of(comparison.values, "reach", "completion_time").values()
     counts = [(mean.label, *mean.counts) for mean in times]
     assert counts == [("direct", 6), ("ee", 6), ("ee, scripted", 5)]
-    before = [(each.label, each.estimate) for each in six[1].contrasts]
-    assert [(each.label, each.estimate) for each in comparison.contrasts] == before
+    before = [(each.label, each.estimate, each.p) for each in six[1].contrasts]
+    assert [(each.label, each.estimate, each.p) for each in comparison.contrasts] == before
     told = people_report(comparison).cautions
     assert any(text.startswith("Scripted operators stand beside") for text in told)
     undos = of(comparison.values, "reach", "undos")

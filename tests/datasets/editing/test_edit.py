@@ -273,6 +273,14 @@ def test_an_episode_that_hardly_moves_is_not_trimmed(lasting):
     assert moving_stretch(episode, 0.25) == (0, len(state))
 
 
+def test_a_success_before_anything_moves_is_not_cut_off():
+    state = np.clip(np.arange(100.0) - 40, 0, 20)[:, None] / 20
+    info, frames = SimpleNamespace(features={}, fps=20), {"next.success": np.arange(100) == 2}
+    episode = SimpleNamespace(configuration=state, count=100, fps=20, frames=frames, info=info)
+    episode.entries, episode.matrix = lambda part: ("a.pos",), lambda part: state
+    assert moving_stretch(episode, 0.0)[0] == 2
+
+
 def test_a_gripper_that_moves_is_not_idle():
     """The base moves in frames 50 to 100; the gripper closes before, and opens after it."""
     steps = np.arange(200)

@@ -11,7 +11,7 @@ import pytest
 from canned import copied
 from command_helpers import command, ran, refused
 from compare_helpers import JOINTS, lerobot_dataset, quick_and_slow
-from datasets_helpers import TINY_FEATURES, record, record_one, resume, tree
+from datasets_helpers import TINY_FEATURES, create, record, record_one, resume, tree
 from editing_helpers import content
 
 from handrail.controllers.errors import HandrailError
@@ -19,6 +19,7 @@ from handrail.datasets.editing.merge import merge_datasets
 from handrail.datasets.format.episode_rows import EpisodeRows
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.metadata import Checksum
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.reading.check import check_report, check_whole
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording import checksums
@@ -168,7 +169,22 @@ def test_a_value_that_is_not_there_is_no_number(tmp_path, name):
     values = table.column(name).to_pylist()
     gap = pa.array([*values[:2], None, *values[3:]], table.schema.field(place).type)
     pq.write_table(table.set_column(place, name, gap), path)
-    with pytest.raises(HandrailError, match=r"\A[^\n]*1 rows without a value where (int64|bool)[^\n]*\Z"):
+    with pytest.raises(HandrailError, match=r"\A[^\n]*1 rows without a value, expected (int64|bool)[^\n]*\Z"):
+        read_frames(root, 0)
+
+
+def test_a_number_that_is_not_there_in_a_list_is_no_number(tmp_path):
+    root = tmp_path / "set"
+    with create(root, features={"counts": Feature("int64", (2,))}) as writer:
+        for index in range(3):
+            writer.add_frame({"counts": np.array([index, 1])}, "go")
+        writer.save_episode({})
+    path = Layout(root).data(0)
+    table = pq.read_table(path)
+    place = table.schema.get_field_index("counts")
+    gap = pa.array([[1, None], *[[1, 2]] * (len(table) - 1)], table.schema.field(place).type)
+    pq.write_table(table.set_column(place, "counts", gap), path)
+    with pytest.raises(HandrailError, match="some rows without a value, expected int64"):
         read_frames(root, 0)
 
 

@@ -86,5 +86,5 @@ def test_single_pictures_are_no_video(tmp_path):
     }
     info = DatasetInfo(tmp_path, 20, "robot", features, 1, 1, "", "", from_handrail=False)
     states = np.zeros((1, len(encoder.reads.interface.state_names)))
-    with pytest.raises(HandrailError, match="expected a video of front, found single pictures"):
+    with pytest.raises(HandrailError, match="expected a video of front, got pictures"):
         list(encoded(info, [{"length": 1}], encoder, [{"observation.state": states}]))

@@ -196,7 +196,7 @@ WRONG = {
     "filter": ({"protection": "filter"}, ("chase",), "or a policy of joint velocities"),
     "rests": ({"protection": "mpc"}, ("single",), "or a policy of joint velocities"),
     "tasks": ({}, ("chase", "bold"), "expected policies of one task, got pick_place, reach"),
-    "time limits": ({"time_limit": 0.0}, ("brief", "chase_1"), "by another --label"),
+    "time limits": ({"time_limit": 0.0}, ("brief", "chase_1"), "evaluate it by another --label"),
     "the same policy": ({}, ("chase", "nan"), "expected each dataset draw and training seed once"),
     "json": ({"json": "no/such/folder/e.json"}, ("chase",), "expected a .json file in an existing folder"),
     "video": ({"video": "film.gif"}, ("chase",), "expected a .mp4 file in an existing folder"),

@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.conditions import policy_conditions, read_checkpoint
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
-from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, write_meta
+from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, read_meta, write_meta
 
 
 def entry(kind, *shape):
@@ -212,3 +212,10 @@ def test_the_first_policy_that_drove_is_filmed(folder, tmp_path):
 def test_only_bad_policies_are_bad_input(folder):
     with pytest.raises(HandrailError, match="found none; unknown mode"):
         evaluate(config(folder / "nothing", folder / "mixed"), load=unable)
+
+
+def test_a_policy_is_read_whatever_its_loss_was(tmp_path):
+    """A held-out episode may leave the ranges of the training widely."""
+    meta = PolicyMeta(None, "", "", "robot", 20, "recorded", 0, 0, {}, "act", 1, validation={"500": 2e6})
+    write_meta(tmp_path, meta)
+    assert read_meta(tmp_path) == meta

@@ -1,6 +1,7 @@
 """Rounds: a policy learns from all data of its way so far, in the same time; what is gone comes again."""
 
 import dataclasses
+import json
 import shutil
 from pathlib import Path
 
@@ -113,6 +114,19 @@ def unfinished(layout, job):
     (layout.policy(job.policy) / "checkpoints/000010").rename(
         layout.policy(job.policy) / "checkpoints/000004"
     )
+
+
+def test_a_recording_of_more_than_was_kept_is_cut_before_it_is_learnt_from(tmp_path, preset):
+    """Made again, and interrupted: more of it is there than fits into the time."""
+    design, layout, found = everything(tmp_path, preset)
+    by_name = {job.name: job for job in found}
+    note = layout.done(by_name["collect/reach/more-1/0"])
+    content = json.loads(note.read_text())
+    content["result"]["episodes"] -= 1
+    note.write_text(json.dumps(content))
+    layout.done(by_name[POLICY.format("more-1")]).unlink()
+    again = {job.name for job in StudyProgress(design, layout).todo()}
+    assert {"collect/reach/more-1/0", POLICY.format("more-1")} <= again
 
 
 @pytest.mark.parametrize("damage", [gone, unfinished])

@@ -22,6 +22,8 @@ WRONG = (
     ("rl", "--steps 0", "--steps"),
     ("latency", "--browser /none", "--browser /none: expected a program"),
     ("soak", "--hours nan", "--hours: expected"),
+    ("soak", "--fault typo", "--fault typo: expected a part of a name in faults.py, possible here"),
+    ("soak", "--work edits", "unknown --work 'edits': expected one of edit, evaluate, packed"),
 )
 
 

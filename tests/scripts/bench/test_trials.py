@@ -63,3 +63,10 @@ def test_another_file_is_left_alone(config, tmp_path):
         with pytest.raises(HandrailError, match="--json"):
             trials_file(replace(config, json=str(path)))
         assert path.read_text() == content
+
+
+@pytest.mark.parametrize("robot", ["lekiwi", "ridgeback_panda"])
+def test_all_modes_are_those_whose_controller_drives_the_robot(robot):
+    names = TrialsConfig(robot=robot).mode_names
+    assert {"ee", "direct"} <= set(names)
+    assert "rl" not in names

@@ -169,13 +169,6 @@ def test_choices_count_as_switches_where_they_change_what_is_owned(operator):
     assert intent.frames.tool == "tool"
 
 
-def test_beside_a_policy_no_joint_is_held_still():
-    """The policy would move it: the page does not say that it stands."""
-    both = Person(MODEL, fitting(MODES, 1), "ee", supervises=True)
-    both.ask(Ask("lock", (3,)))
-    assert not both.setting.locked
-
-
 def test_the_hand_moves_as_the_page_looks(operator):
     begin(operator)
     drive(operator, ee_vx=1.0)
