@@ -67,6 +67,6 @@ def test_another_file_is_left_alone(config, tmp_path):
 
 @pytest.mark.parametrize("robot", ["lekiwi", "ridgeback_panda"])
 def test_all_modes_are_those_whose_controller_drives_the_robot(robot):
-    names = TrialsConfig(robot=robot).mode_names
+    names = TrialsConfig(robot=robot, modes="all").mode_names
     assert {"ee", "direct"} <= set(names)
     assert "rl" not in names
