@@ -2,7 +2,8 @@
 
 `python docs/results/success.py FIGURE.png ARCHIVE.tar.xz …`. A point is a mode with an amount of data in one
 study: the mean over draws, and 95 % by Student's t over these, whose variance is at least that of a draw's
-rollouts by chance; one draw has none. Amounts of the same recordings are joined. Tasks are in the order of
+rollouts by chance; one draw has none. Amounts of the same recordings are joined; policies that an earlier
+study has are drawn once. Tasks are in the order of
 their least minutes, modes in that of their highest success. It also prints the points.
 """
 
@@ -55,6 +56,13 @@ def main(figure, *archives):
     studies = [read(archive) for archive in archives]
     if not all(studies):
         sys.exit("expected undisturbed policies of realised motion, got none")
+    drawn_before = set()  # a study in a copy of another's folder has policies of it, too
+    for study in studies:
+        for (task, mode), kinds in list(study.items()):
+            own = {(task, mode, *draw) for draws in kinds.values() for draw in draws}
+            if own <= drawn_before:
+                del study[task, mode]
+            drawn_before |= own
     points = [
         {key: sorted((*point(draws), len(draws)) for draws in kinds.values()) for key, kinds in study.items()}
         for study in studies
