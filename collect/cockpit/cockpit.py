@@ -217,8 +217,8 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     person = Person(env.model, build_modes(config, env), config.mode_name, supervises=bool(config.policy))
     server = open_server(config.cockpit, say)
     say(f"Episodes go to {config.dataset.folder}. To end: End recording on the page, or Ctrl-C here.")
-    no = {"undo": env.real, "lock": bool(config.policy)}  # what moved stays there; a policy moves every joint
-    refuses = [ask for ask, is_refused in no.items() if is_refused]
+    # what has moved does not go back by itself; a policy moves every joint
+    refuses = [ask for ask, no in (("undo", env.real), ("lock", config.policy)) if no]
     return Cockpit(person, server, refuses, say, config)
 
 

@@ -75,15 +75,14 @@ class DeviceReader:
         is_open = False
         while not self._ended.is_set():
             try:
-                is_back = not is_open and self._tried.is_set()  # what is held then is no press, STOP is
-                if not is_open:
+                if is_new := not is_open:  # what is held then is no press, STOP is
                     self.device.open()
                     self.trouble, is_open = "", True
                     self._tried.set()
                 newest = self.device.read()
                 with self._lock:
                     self._newest = newest
-                    self._presses += [x for x in newest.presses if x in self.controls.stops or not is_back]
+                    self._presses += [x for x in newest.presses if x in self.controls.stops or not is_new]
             except Exception as error:  # whatever a driver raises
                 self._lose(error)
                 self._close()

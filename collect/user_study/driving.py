@@ -8,7 +8,6 @@ from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
-from handrail.collect.operators.person.inputs import Ask
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_env, build_modes
 from handrail.collect.session.outcome import Outcome
@@ -63,6 +62,7 @@ class Driving:
         if "mask" in refuses:
             refuses |= {"lock"}  # it changes the mask, too
         person = Person(env.model, {name: modes[name] for name in offered}, mode)
+        person.again = {"mode": modes[mode], "locked": ()}
         self._cockpit = Cockpit(person, self._server, refuses)
         self._recording = Recording(config, env, self._cockpit)
         self._recording.into(writer)
@@ -77,9 +77,6 @@ class Driving:
         """Run a trial, or one of practice, and return how it went."""
         assert self._cockpit
         assert self._recording
-        person = self._cockpit.person
-        person.practises = step.kind == "practice"
-        for ask in (Ask("mode", step.condition), Ask("lock", [])):  # as before every trial of this mode
-            person.ask(ask)
+        self._cockpit.person.practises = step.kind == "practice"
         self._recording.columns |= {"participant": self._name, "trial": step.trial}
         return self._recording.episode(seed, self._interrupts)

@@ -64,7 +64,7 @@ def erase(folder: StudyFolder, name: str) -> str:
     who, trials = folder.participant(name), []
     who.keep(erasing=True)
     for _, _, root in folder.conditions:
-        if (root / "meta").is_dir():
+        if any(root.glob("meta/*")):
             count = drop_episodes(root, lambda columns: columns.get("participant") == name)
             trials += [f"{count} of {root.relative_to(folder.root)}"] if count else []
     export(folder)

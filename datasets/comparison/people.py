@@ -125,6 +125,7 @@ def compared(
         participants: All participants.
         rng: Of resampling and permutation.
     """
+    apart = rng.spawn(1)[0]  # scripts change nothing of people
     scripted = list(dict.fromkeys(each.condition for each in trials if not each.participant))
     tests = len(measures) * (len(labels) - 1)
     values: list[Value] = []
@@ -138,7 +139,7 @@ def compared(
         values += found.values()
         for label in scripted:
             drawn = [t.values[measure.name] for t in trials if (t.condition, t.participant) == (label, "")]
-            values.append(mean_value(measure, f"{label}, scripted", np.array(drawn), rng, scope=scope))
+            values.append(mean_value(measure, f"{label}, scripted", np.array(drawn), apart, scope=scope))
         contrasts += [
             contrast(found[label], found[baseline], paired_by_scene(scenes, people[baseline], rng, tests))
             for label, scenes in people.items()

@@ -133,9 +133,10 @@ def _participant(episode: Episode) -> str:
 def _task_and_mode(episode: Episode) -> tuple[str, str]:
     """Return task and mode of an episode of a dataset that is no part of the study."""
     where = f"dataset {str(episode.info.root)!r}, episode {episode.number}"
-    if (operator := episode.meta.get("operator")) != SCRIPTED or _participant(episode):
+    name, operator = _participant(episode), episode.meta.get("operator")
+    if name or operator != SCRIPTED:
         raise HandrailError(
-            f"{where}: expected a scripted operator, got {_participant(episode) or operator!r};"
+            f"{where}: expected a scripted operator, got {f'participant {name!r}' if name else operator!r};"
             " a study's own datasets are found in --study"
         )
     task, mode = (str(episode.meta.get(name) or "") for name in ("environment", "mode"))

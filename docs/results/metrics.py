@@ -5,8 +5,8 @@ the policy that learnt from it, over modes and draws of a study, a task and an a
 over these, without those in which the metric or success does not vary. Its interval: 95 % of ρ over modes
 drawn anew with their draws. p: how often some metric has a larger |ρ| where success is given to modes by
 chance, so that it holds for all metrics together. Modes are chosen once for all groups: amounts of a task
-share recordings. Explores: modes differ in more than one metric, and m of them give no p below 1 / m!, nor a
-sure interval.
+share recordings. Policies that an earlier study has, too, are left out. Explores: modes differ in more than
+one metric, and m of them give no p below 1 / m!, nor a sure interval.
 """
 
 import json
@@ -26,7 +26,7 @@ ALONE = {  # each recording by itself: no common scale, or another controller's 
 
 def read(files):
     """Return metrics and success, draw by draw, of each mode of each group of policies."""
-    found = defaultdict(dict)
+    found, before = defaultdict(dict), set()
     for file in files:
         study = json.loads(Path(file).read_text())
         quality = {tuple(job.split("/")[1:]): each["result"] for job, each in study["jobs"].items()}
@@ -41,8 +41,14 @@ def read(files):
                 or each["draws"].keys() < {*draws}
             ):
                 continue
-            group = found[Path(file).stem, each["task"], amount]
-            group[mode] = recorded, [each["draws"][draw] for draw in draws]
+            success = [each["draws"][draw] for draw in draws]
+            own = {
+                json.dumps([each["task"], each["label"], *pair])
+                for pair in zip(recorded, success, strict=True)
+            }
+            if not own <= before:
+                found[Path(file).stem, each["task"], amount][mode] = recorded, success
+            before |= own
     return {name: group for name, group in found.items() if len(group) > 2}
 
 

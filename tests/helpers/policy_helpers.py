@@ -1,5 +1,7 @@
 """Shared by the tests of evaluation: checkpoint folders of policies that nobody trained."""
 
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -159,3 +161,8 @@ def unable(path):
     if path.name == "broken":
         raise HandrailError("broken: no weights")
     return StandIn(load(path).interface, "still")
+
+
+def killed(path):
+    """Load a policy in a process that is then killed, as one that wants too much memory is."""
+    os.kill(os.getpid(), signal.SIGKILL)

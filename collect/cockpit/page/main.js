@@ -30,7 +30,7 @@ const ask = (what, value) => { episodes.cancel(); link.ask(what, value); };
 const DO = {
   start: () => { decision.close(); return frame?.phase === "driving" ? ask("pause") : episodes.start(frame?.phase); },
   stop: () => ask("stop"), grip: () => inputs.flipGrip(frame?.hand ?? 0), pause: () => ask("pause"), success: () => decision.success(),
-  failure: () => decision.failure(), restart: () => ask("restart"), discard: () => ask("discard"), undo: () => ask("undo"),
+  failure: () => decision.failure(), restart: () => { decision.close(); ask("restart"); }, discard: () => { decision.close(); ask("discard"); }, undo: () => ask("undo"),
   quit: () => decision.quit(), help: () => help.toggle(), back: () => help.cancel() || decision.close() || help.close() || view.playback.close(),
   hand: () => otherHand(), grip_left: () => inputs.flipGrip(0), grip_right: () => inputs.flipGrip(1),
   focus: () => otherFocus(), slower: () => faster(-0.2), faster: () => faster(0.2), mode: () => next("mode"), frame: () => next("frame"),

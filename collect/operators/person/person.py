@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,7 @@ class Person:
         inputs: the newest.
         received: when they came [s].
         round_trip: of the frame that they answer [s].
+        again: what of `Setting` every episode begins with; else it goes on as it was.
         closed: how far each gripper shall be, 0 open to 1 closed: as it is until it is changed.
     """
 
@@ -82,6 +84,7 @@ class Person:
         self.practises = False
         self._event: EpisodeEvent | None = None
         self._quits = False  # once the episode that was judged is saved
+        self.again: Mapping[str, Any] = {}
         self._armed = False  # everything was let go once since the robot had to brake
         self._begun = False  # somebody has driven in this episode
         self._slept = _slept()  # so far, as is known [s]
@@ -93,7 +96,7 @@ class Person:
 
     def over(self) -> None:
         """Take note that the episode before is over: what is asked from now on is not of it."""
-        self.setting = replace(self.setting, axis=-1, switches=0)
+        self.setting = replace(self.setting, **self.again, axis=-1, switches=0)
         self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.READY
         quits = self.between is EpisodeEvent.QUIT
         self._event, self._quits = EpisodeEvent.QUIT if quits else None, False

@@ -94,7 +94,7 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
             raise HandrailError(f"{where}: expected --robot and --task: neither it nor its dataset says them")
         meta = replace(meta, environment=task)
         own = len(AgentObservation(load_model(robot)).names)  # more: robot and scene, of lerobot-record
-        if config.mode and not meta.mode and sizes.get(STATE, own) != own:
+        if config.mode and not meta.mode and ENVIRONMENT not in sizes and sizes.get(STATE) != own:
             meta = replace(meta, mode=config.mode, actions="intent")
     meta = replace(meta, robot=robot or meta.robot, hand=config.hand or meta.hand)
     if meta.hand == MIXED:

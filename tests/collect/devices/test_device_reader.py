@@ -57,7 +57,8 @@ def eventually(check):
 
 
 def test_the_newest_wins_and_no_press_is_lost(device, poller):
-    device.readings = [DeviceInput(float(index), presses=(str(index),)) for index in range(5)]
+    presses = ["", *map(str, range(5))]  # what is held at first is none
+    device.readings = [DeviceInput(float(index), presses=(press,)) for index, press in enumerate(presses)]
     poller.start()
     seen = []
     eventually(lambda: seen.extend(poller.take()[1]) or len(seen) == 5)

@@ -85,7 +85,8 @@ def test_every_trial_begins_in_its_mode_with_no_joint_held(tmp_path):
         driving.run(step, 3)
         assert driving.person.setting.mode.name == "direct"
         server.unread = [(Kind.ASK, {"what": what, "value": what == "start"}) for what in ("stop", "start")]
-        server.asked = 0
+        server.asked = 1  # another mode is chosen while the next trial is made
+        server.unread.insert(0, (Kind.ASK, {"what": "mode", "value": "direct"}))
         driving.run(step, 4)
         setting = driving.person.setting
     assert (setting.mode.name, setting.locked, setting.switches) == ("ee", (), 0)

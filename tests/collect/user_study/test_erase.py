@@ -154,6 +154,6 @@ def test_nobody_is_erased_whose_episodes_cannot_be(two, tmp_path):
     shutil.copytree(two.root, tmp_path / "study")
     folder = type(two)(tmp_path / "study")
     (folder.root / "data" / "reach" / "ee" / "meta" / "handrail.json").unlink()
-    with pytest.raises(HandrailError, match="was not written by Handrail"):
+    with pytest.raises(HandrailError, match="expected one that Handrail wrote"):
         erased(folder, "P001")
     assert "P001" in folder.participants()
