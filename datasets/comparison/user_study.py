@@ -136,7 +136,7 @@ def _task_and_mode(episode: Episode) -> tuple[str, str]:
     name, operator = _participant(episode), episode.meta.get("operator")
     if name or operator != SCRIPTED:
         raise HandrailError(
-            f"{where}: expected a scripted operator, got {f'participant {name!r}' if name else operator!r};"
+            f"{where}: expected a scripted operator, got {f'participant {name!r}' if name else repr(operator)};"
             " a study's own datasets are found in --study"
         )
     task, mode = (str(episode.meta.get(name) or "") for name in ("environment", "mode"))

@@ -214,9 +214,10 @@ def test_scripted_operators_stand_beside_people_and_are_not_tested(six, tmp_path
     assert undos["ee"].estimate == 1.0
 
 
-def test_people_are_no_scripts(six):
-    beside = six[0] / "data" / "reach" / "ee"
-    with pytest.raises(HandrailError, match="expected a scripted operator, got participant 'P1'"):
+@pytest.mark.parametrize(("name", "got"), [("P1", "participant 'P1'"), ("", "'browser'")])
+def test_people_are_no_scripts(name, got, six, tmp_path):
+    beside = dataset(tmp_path / "beside", "reach", "ee", [(name, 7, 30, True)])
+    with pytest.raises(HandrailError, match=f"expected a scripted operator, got {got}"):
         compare_people(CompareConfig(datasets=(str(beside),), study=str(six[0])))
 
 
