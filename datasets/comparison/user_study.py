@@ -135,9 +135,9 @@ def _task_and_mode(episode: Episode) -> tuple[str, str]:
     where = f"dataset {str(episode.info.root)!r}, episode {episode.number}"
     name, operator = _participant(episode), episode.meta.get("operator")
     if name or operator != SCRIPTED:
+        got = f"participant {name!r}" if name else repr(operator)
         raise HandrailError(
-            f"{where}: expected a scripted operator, got {f'participant {name!r}' if name else repr(operator)};"
-            " a study's own datasets are found in --study"
+            f"{where}: expected a scripted operator, got {got}; a study's own datasets are found in --study"
         )
     task, mode = (str(episode.meta.get(name) or "") for name in ("environment", "mode"))
     if not (task and mode):
