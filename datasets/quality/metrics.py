@@ -50,7 +50,8 @@ def ldlj(speed: np.ndarray, fs: float) -> float:
         fs: Samples a second [Hz].
 
     Returns:
-        The measure (minimum jerk: about −5.3), or NaN if nothing moves or there are fewer than three samples.
+        The measure (minimum jerk: about −5.3), or NaN if nothing moves, the speed is even, or there are fewer
+        than three samples.
     """
     jerk = np.diff(speed, 2) * fs**2
     if not _moves(speed) or not jerk.any() or np.ptp(speed) <= 1e-4 * np.abs(speed).max():  # even

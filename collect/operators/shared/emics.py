@@ -155,12 +155,7 @@ class LevelSwitcher:
         criteria: the most critical first.
     """
 
-    def __init__(
-        self,
-        groups: Groups,
-        settings: ArbiterSettings,
-        criteria: Sequence[Performance | Availability | Purpose],
-    ) -> None:
+    def __init__(self, groups: Groups, settings: ArbiterSettings, criteria: Sequence[Criterion]) -> None:
         self._groups, self._lately = groups, Lately(groups, settings)
         self._dwell, self._criteria = settings.dwell, criteria
         self.reset()
