@@ -1,11 +1,12 @@
 """The verbs of `handrail-user-study`."""
 
 import shlex
-import time
+import sys
 from collections.abc import Callable
 
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.cockpit.cockpit import NEEDED
+from handrail.collect.cockpit.pipe import Kind
 from handrail.collect.cockpit.process import open_server
 from handrail.collect.user_study.conduct import Conductor, Ending
 from handrail.collect.user_study.config import StudySessionConfig
@@ -18,8 +19,6 @@ from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.editing.merge import drop_episodes
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
-
-_FAREWELL = 1.0  # in which the page shows its last card [s]
 
 
 def study_session(config: StudySessionConfig) -> int:
@@ -90,8 +89,9 @@ def _run(config: StudySessionConfig, folder: StudyFolder, say: Callable[[str], N
             ending = Conductor(folder, who, Cards(server), driving, say).run()
             if ending is Ending.REFUSED:
                 erase(folder, who.name)
-            time.sleep(_FAREWELL)
-    finally:
+    finally:  # a page that goes on trying would take the next participant's session
+        over = {"participant": who.name, "trouble": str(sys.exception() or "")}
+        server.pipe.send_surely(Kind.OVER, over)
         server.close()
         export(folder)
     if ending is Ending.REFUSED:

@@ -49,7 +49,7 @@ const link = new Link({
   you: (you) => { if (!you.driving) decision.close(); panels.told(you); study.told(you); },
   card: (card) => study.show(card),
   error: (said) => notices.say(`The robot's side says: ${said}`),
-  over: (said) => panels.ended(said),
+  over: (said) => { panels.ended(said); study.ended(said); },
   picture: (index, blob) => panels.picture(index, blob),
   stage: async (said) => {
     if (stage && stage.robot !== said.robot) return location.reload(); // nothing of it fits

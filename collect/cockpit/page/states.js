@@ -25,7 +25,8 @@ function nameOf({ isConnected, isDriver, isSilent, frame }) {
   return frame.phase === "driving" && frame.practice ? "practice" : frame.phase;
 }
 
-function overWords({ saved, folder, next, trouble }) {
+function overWords({ participant, saved, folder, next, trouble }) {
+  if (participant) return `The session of ${participant} ${trouble ? `ended with an error: ${trouble}` : "is over."}`;
   const kept = saved ? `${saved} ${saved === 1 ? "episode" : "episodes"}${folder ? ` in ${folder}` : ""}.` : "no episode was saved.";
   if (trouble) return `The recording ended with an error: ${trouble}\nSaved before: ${kept}`;
   const what = `Recording is over: ${kept}`;

@@ -62,6 +62,13 @@ export class Study {
     this.cover();
   }
 
+  // The last card stays; of a session that failed nothing can be answered any more.
+  ended({ trouble }) {
+    if (!trouble) return;
+    this.card = null;
+    this.cover();
+  }
+
   show(card) {
     const isNew = card.id !== this.card?.id;
     this.card = card;
