@@ -19,7 +19,7 @@ class ClientConfig:
     """Where the robot is; the flags are LeRobot's."""
 
     remote_ip: str = "127.0.0.1"
-    """Of the computer on the robot."""
+    """The robot computer's address."""
     port_zmq_cmd: Port = 5555
     """Where it takes commands."""
     port_zmq_observations: Port = 5556

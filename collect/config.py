@@ -58,7 +58,7 @@ class SessionConfig:
     robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
     """A robot, or a description file (.toml)."""
     seed: Count = 0
-    """Of scenes and operator: the same seed and versions give the same data."""
+    """Seed of scenes and operator: the same seed and versions give the same data."""
     cameras: Names = ""
     """Cameras of the robot to record, such as front,wrist; scene overlooks it; all, or none by default."""
     image_size: Advanced[int | str] = 128
@@ -172,7 +172,7 @@ class FoundDatasetConfig(DatasetConfig):
     """Where the episodes go, how many, how fast; without a folder, one is found."""
 
     place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")] = ""
-    """Folder of the dataset; one that is there is added to. By default outputs/cockpit/TASK, or beside it."""
+    """Folder of the dataset, new or to add to; by default outputs/cockpit/TASK, or TASK-2, …"""
 
     @property
     def is_found(self) -> bool:

@@ -18,7 +18,7 @@ from handrail.datasets.lists import Names
 class NewRobotConfig:
     """Write a robot's description from its URDF, and a line for each guess that a person should look at."""
 
-    urdf: tyro.conf.Positional[str]
+    urdf: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")]
     """A file, or one in an installed package: example-robot-data/robots/xarm_description/urdf/xarm7.urdf."""
     hands: Names = ""
     """Link at the end of the hand; of several hands NAME=LINK each, such as left=l_tool,right=r_tool."""
@@ -55,7 +55,7 @@ class NewRobotConfig:
 class CheckRobotConfig:
     """Print a line for each thing that is wrong with a robot; the exit code is 1 if there is any."""
 
-    robot: tyro.conf.Positional[Annotated[str, one_of(ROBOTS)]]
+    robot: Annotated[tyro.conf.Positional[Annotated[str, one_of(ROBOTS)]], tyro.conf.arg(metavar="ROBOT")]
     """A robot, or a description file (.toml)."""
     picture: str = ""
     """Also draw its shapes, the pairs that can meet and the reach of each hand into this .png file."""

@@ -71,7 +71,7 @@ class CalibrateConfig:
     robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
     """A robot, or a description file (.toml)."""
     unit: Literal["degrees", "radians", "other"] = "degrees"
-    """Of the leader's joints: degrees, radians, or other (by your quarter turns: 23 steps or more)."""
+    """Unit of the leader's joints: degrees, radians, or other (by your quarter turns: 23 steps or more)."""
 
     def check(self) -> None:
         """Check the settings."""

@@ -60,7 +60,7 @@ def not_installed(wanted_by: str, module: str, extra: str = "") -> HandrailError
     what = f"'.[{extra}]'" if extra else "."
     return HandrailError(
         f"{wanted_by}: expected {module}, found none; in the clone of Handrail: "
-        f"pip install -c constraints.txt {what}"
+        f"pip install -c constraints.txt -e {what}"
     )
 
 

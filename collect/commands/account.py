@@ -24,7 +24,7 @@ _DROPPED = {
     EpisodeEvent.RESTART: "begun again",
     EpisodeEvent.QUIT: "not finished",
 }
-_NEXT = ("handrail-inspect {root}", "handrail-replay {root}", "handrail-train {root} --output outputs/policy")
+_NEXT = ("handrail-inspect {root}", "handrail-replay {root}", "handrail-train {root} --output {root}_policy")
 
 
 def _why_dropped(outcome: Outcome) -> str:

@@ -56,7 +56,7 @@ class ReplayConfig(TrustConfig):
 class RenderConfig(EditConfig, ExecutionConfig, TrustConfig):
     """Write a dataset with pictures of its episodes, drawn while their commands run again.
 
-    One that was begun is gone on with.
+    A second run goes on with a first.
     """
 
     verb = "render"

@@ -89,7 +89,7 @@ class Card:
             Phase.READY: f"press {start} to begin",
             Phase.PAUSED: f"paused; press {start} to go on{lost}",
             Phase.LOST: "stands still: let go of everything" + (f", then hold {hold}" if hold else ""),
-            Phase.STOPPED: f"emergency stop; {start} releases it",
+            Phase.STOPPED: f"STOPPED; {start} releases it",
             Phase.DRIVING: f"hold {hold} to move" if hold else "drive",
         }[self.person.phase]
 

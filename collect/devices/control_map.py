@@ -34,7 +34,7 @@ ACTIONS: Mapping[str, str] = {
     "start": "start, go on",
     "start_or_pause": "start, pause",
     "pause": "pause",
-    "stop": "emergency stop",
+    "stop": "STOP",
     "grip": "close or open the gripper",
     "grip_left": "close or open the first gripper",
     "grip_right": "close or open the second gripper",

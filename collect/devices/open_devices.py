@@ -57,7 +57,7 @@ def open_device(
         beside = _reader("keyboard", TeleopConfig(), hands)
         beside.controls = beside.controls.only()
     person = _person(config, env, modes or build_modes(config, env), main, beside)
-    say(f"{config.operator}: hold {control_of([main.controls], HOLD) or 'what moves'} to move")
+    say(f"{config.operator}: hold {control_of([main.controls], HOLD) or 'a key or cap'} to move")
     return person
 
 

@@ -26,7 +26,7 @@ class HostConfig:
     robot: Annotated[str, one_of(ROBOTS)] = "lekiwi"
     """A LeKiwi, or its description file (.toml)."""
     seed: Annotated[int, Meta(ge=0, le=2**53 - 1)] = 0
-    """Of the scene, until a client of Handrail's asks for another one; and of what gets lost."""
+    """Seed of the scene, until a client of Handrail's asks for another one; and of what gets lost."""
     address: str = "127.0.0.1"
     """Where it listens; * for everybody in the network."""
     port_zmq_cmd: Port = 5555

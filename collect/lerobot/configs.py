@@ -58,7 +58,7 @@ class HandrailSimConfig(SimulatedConfig, RobotConfig):
     mask: str = ""
     """A mask of your own instead of the mode's: 0 or 1 for each channel."""
     seed: int = 0
-    """Of the scenes: those of `handrail-record` with this seed."""
+    """Seed of the scenes: those of `handrail-record` with this seed."""
     evaluation: bool = False
     """Whether they are those of `handrail-evaluate` with this seed: none is in a recording."""
     episode: int = 0
@@ -105,7 +105,7 @@ class HandrailCockpitConfig(TeleoperatorConfig):
     token: bool = CockpitConfig.token
     """Whether to ask for the token on 127.0.0.1 too; without, every account here can drive."""
     port: int = CockpitConfig.port
-    """To listen at; the next free one where it is taken; 0 for any."""
+    """Port to listen at; the next free one where it is taken; 0 for any."""
     open: bool = CockpitConfig.open
     """Whether to open the page in this computer's browser, unless it asks for a token."""
     certificate: str = ""

@@ -111,7 +111,7 @@ class Conductor:
         practice = f"Practice first: at most {study.practice.most}. " if study.practice.most else ""
         text = (
             f"Your way of steering now: {mode}\n\n{help_}\n\nThe task: {briefing.task}\n\n{practice}"
-            f"Trials that count: {study.trials}. Failed gives a trial up; Pause lets you rest."
+            f"Trials that count: {study.trials}. Failed gives a trial up; Pause holds it."
         )
         place = self._who.session.modes.index(mode) + 1
         page = Form("instructions", f"Part {place} of {len(study.modes)}", text)

@@ -37,7 +37,7 @@ class CompareConfig:
     pictures: Advanced[bool] = True
     """Show first pictures of the cameras."""
     seed: Advanced[Count] = 0
-    """Of the resampling: the same seed gives the same report."""
+    """Seed of the resampling: the same seed gives the same report."""
     verify: Advanced[bool] = False
     """Read every file of the datasets anew, not only those that have changed since they were checked."""
     study: str = ""

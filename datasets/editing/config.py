@@ -22,12 +22,12 @@ class EditConfig:
     needed: ClassVar[tuple[str, ...]] = ()
     """Settings that may not be empty."""
 
-    folder: tyro.conf.Positional[str]
+    folder: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")]
     """Folder of the dataset."""
     output: str = ""
-    """Folder of the new dataset; of split, the folder for the parts."""
+    """Folder of the new dataset, or for the parts of split."""
     in_place: bool = False
-    """Write the dataset anew in its own place, instead of --output; what is left out is gone."""
+    """Replace the dataset instead (not with split, render); what is left out is gone."""
     name: str = ""
     """Name of the new dataset, owner/name; that of the old one when empty."""
     verify: bool = False

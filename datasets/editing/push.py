@@ -70,7 +70,7 @@ class Upload:
     def __str__(self) -> str:
         stays = f"; these stay: {', '.join(self.stays)}" if self.stays else ""
         seen = "private" if self.private else "public"
-        where = f"to {self.to}" if self.to else f"as {self.repo_id} ({seen})"
+        where = f"to {self.to}" if self.to else f"as {self.repo_id} ({seen}, {self.license_id})"
         return f"{self.root} {where}: {len(self.files)} files, {self.size / 1e6:.1f} MB{stays}"
 
 

@@ -66,9 +66,9 @@ class TrainConfig:
     lr: Advanced[NonNegative] = 0.0
     """Highest learning rate; 0 for the preset's."""
     seed: Count = 0
-    """Of the policy's first weights and the order of the samples."""
+    """Seed of the policy's first weights and the order of the samples."""
     threads: Advanced[AtLeastOne] = 1
-    """Of PyTorch; two trainings with one thread each are faster than one after the other with two."""
+    """PyTorch's; two trainings with one thread each are faster than one after the other with two."""
     device: str = ""
     """Device: cpu, cuda, cuda:1, mps; the preset's when empty."""
     save_freq: Advanced[AtLeastOne] = 2000

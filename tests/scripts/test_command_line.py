@@ -153,7 +153,7 @@ def test_install_hints_come_from_one_place_and_lead_to_the_clone():
     assert [path.name for path in files if "pip install" in path.read_text()] == ["errors.py"]
     for extra, what in (("display", "'.[display]'"), ("", ".")):
         message = str(not_installed("--flag", "module", extra))
-        assert message.endswith(f"in the clone of Handrail: pip install -c constraints.txt {what}")
+        assert message.endswith(f"in the clone of Handrail: pip install -c constraints.txt -e {what}")
     with pytest.raises(HandrailError, match=r"^handrail-x: expected nowhere, found none; .*'\.\[rl\]'$"):
         check_installed("handrail-x", ("nowhere",), "rl")
 

@@ -43,6 +43,10 @@ def test_commands_parse(words):
         config.check()
 
 
+def test_no_command_of_a_page_for_users_overwrites_our_results():
+    assert not [words for words in commands(pages=PAGES) if "docs/results/" in " ".join(words)]
+
+
 def test_lerobot_s_own_parser_takes_the_training_commands():
     recorded_by_lerobot = {
         word

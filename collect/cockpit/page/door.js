@@ -32,7 +32,7 @@ async function begin() {
 door.addEventListener("submit", async (event) => {
   event.preventDefault();
   if (await enter(document.getElementById("token").value)) begin();
-  else document.getElementById("door-error").textContent = "That is not the token. The terminal says the address with it.";
+  else document.getElementById("door-error").textContent = "Wrong token. The terminal shows the address that contains it.";
 });
 
 addEventListener("hashchange", () => location.reload()); // the address with the token, in the same tab

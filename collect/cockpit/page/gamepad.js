@@ -16,7 +16,7 @@ export class Gamepad {
   look() {
     const pad = [...navigator.getGamepads()].find((each) => each?.connected) ?? null;
     if (pad?.index !== this.pad?.index || pad?.id !== this.pad?.id) {
-      if (!pad) this.say("Gamepad unplugged: it has let go.");
+      if (!pad) this.say("Gamepad unplugged: it stops.");
       else this.say(`Gamepad found. Hold ${this.deadman(pad)} to move.`);
       this.was = null;
       this.letGo();

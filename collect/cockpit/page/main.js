@@ -157,8 +157,8 @@ function keysOf(channels) {
   const { actions, offered } = inputs.mapping, grips = stage.grips ? ["grip", "grip_left", "grip_right"] : [];
   const parts = partsOf(channels, stage.hands.map(({ name }) => name), frame?.hand ?? 0, groups[0]?.channels ?? []);
   const held = inForce(inputs.entries, meant(channels, parts)).map(([code, axis, sign]) => [code, inputs.channelOf(axis, parts), sign]);
-  const once = ["start", ...grips, "failure", "quit", "stop"].filter((name) => name in offered);
-  return [...held, ...once.map((name) => [actions[name], name === "quit" ? "pause" : offered[name].says])];
+  const once = ["start", "pause", ...grips, "failure", "quit", "stop"].filter((name) => name in offered);
+  return [...held, ...once.map((name) => [actions[name], offered[name].says])];
 }
 
 function own() {

@@ -30,7 +30,7 @@ export class Notices {
     const begin = isTouch ? "Press Start, then put a thumb on a stick to move." : `Press Start (${start}). Hold to move: ${pairs(keys)}.`;
     const gripper = actions.hand ? ` ${left} and ${right} close and open the grippers, ${hand} goes to the other hand.`
       : grips ? ` ${isTouch ? "grip" : grip} closes and opens the gripper.` : "";
-    byId("hint-words").textContent = `${begin}${gripper} Let go, and the robot stands still. ${isTouch ? "STOP" : stop} stops it at once.`;
+    byId("hint-words").textContent = `${begin}${gripper} Let go to stop steering; ${isTouch ? "STOP" : stop} stops the robot at once.`;
     byId("hint").hidden = recall("hint", (value) => value === "seen", "") === "seen";
   }
 

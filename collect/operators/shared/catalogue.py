@@ -23,7 +23,7 @@ ARBITERS = Registry(
         ArbiterSpec("whole", f"{_HERE}.by_input:Whole", "any input of the person takes the whole robot"),
         ArbiterSpec("blend", f"{_HERE}.by_input:Blend", "where both ask, both are in the MPC's objective"),
         ArbiterSpec(
-            "emics", f"{_HERE}.emics:emics", "the whole robot changes hands where it makes too little way"
+            "emics", f"{_HERE}.emics:emics", "the policy takes all back where the robot gains too little"
         ),
         ArbiterSpec(
             "hier_emics",

@@ -19,9 +19,9 @@ from handrail.datasets.lists import Names
 
 @dataclass(frozen=True)
 class EncoderConfig:
-    """Train what says from pictures where things are, on scenes that are drawn for it.
+    """Train an encoder, which reads from pictures where things are, on drawn scenes.
 
-    Go on with one that was begun by the same command.
+    The same command goes on with one that was begun.
     """
 
     output: str = "outputs/encoder.safetensors"
@@ -35,7 +35,7 @@ class EncoderConfig:
     image_size: int | str = 224
     """Size of the pictures [pixels]: of a square's side, or WIDTHxHEIGHT."""
     updates: AtLeastOne = 3000
-    """Of the network."""
+    """Updates in all."""
     batch_size: Advanced[AtLeastOne] = 32
     """Samples an update."""
     reuse: Advanced[Annotated[float, Meta(gt=0, le=100)]] = 3.0
@@ -43,13 +43,13 @@ class EncoderConfig:
     lr: Advanced[Annotated[float, Meta(gt=0, le=1)]] = 1e-3
     """Highest learning rate."""
     seed: Count = 0
-    """Of the scenes and the first weights."""
+    """Seed of the scenes and the first weights."""
     device: Advanced[str] = "cpu"
     """Where it learns: cpu, cuda, mps."""
     workers: Advanced[Annotated[int, Meta(ge=0, le=MOST_WORKERS)]] = 1
     """Processes that draw scenes; 0 draws them in between."""
     threads: Advanced[AtLeastOne] = 1
-    """Of PyTorch."""
+    """PyTorch's."""
     overwrite: Advanced[bool] = False
     """Begin anew, whatever is there."""
 

@@ -33,7 +33,7 @@ class EvaluateConfig(ExecutionConfig):
     episodes: Annotated[int, Meta(ge=1, le=MOST_ROLLOUTS)] = 100
     """Rollouts of each policy under each condition."""
     seed: Advanced[Annotated[int, Meta(ge=0, le=10**9)]] = 0
-    """Of the evaluation: which beginnings and disturbances; never those of a recording."""
+    """Seed of the evaluation: which beginnings and disturbances; never those of a recording."""
     protection: Names = "own"
     """The controller between policy and robot, one or more: own (an intent's own controller; none for joint
     velocities), none, mpc, filter."""
@@ -43,7 +43,7 @@ class EvaluateConfig(ExecutionConfig):
     label: Advanced[str] = ""
     """Name of the condition; the teleop mode, and what is special about it, when empty."""
     task: Advanced[Annotated[str, one_of(TASKS)]] = ""
-    """Of policies that do not say it, such as lerobot-train's, or that say a module:name."""
+    """The task, if a policy does not say it (lerobot-train's) or says a module:name."""
     mode: Advanced[str] = ""
     """The teleop mode whose channels a policy of lerobot-train writes. Of policies that say a module:name:
     it is imported only if you say it too."""

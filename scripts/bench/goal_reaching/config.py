@@ -83,7 +83,7 @@ class BenchmarkConfig(ReportConfig, ExecutionConfig):
     goals: AtLeastOne = 100
     """Goals, the same for every controller."""
     seed: Count = 1
-    """Of the goals, obstacles and command noise."""
+    """Seed of the goals, obstacles and command noise."""
     profile: Names = "nominal"
     """How the planner's twist arrives, one or more, or all: nominal, fast15, fast2, fast3, steps, noise,
     delay, dropouts, quantised."""

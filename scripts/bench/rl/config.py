@@ -25,9 +25,9 @@ class TrainRlConfig:
     start_from: str = ""
     """Folder of another run whose last networks this one begins with; its transitions are not taken."""
     seed: Count = 0
-    """Of the goals, the networks and the exploration."""
+    """Seed of the goals, the networks and the exploration."""
     learning_rate: _Share = 1e-4
-    """Of actor, critics and entropy temperature; may be another one after a resume."""
+    """Learning rate of actor, critics and entropy temperature; may be another one after a resume."""
     tau: _Share = 0.001
     """Share of the critics that enters their targets at every update."""
     batch_size: AtLeastOne = 256
@@ -39,7 +39,7 @@ class TrainRlConfig:
     layers: Numbers = (512, 512, 256)
     """Hidden layers of actor and critics."""
     temperature: Annotated[float, Meta(gt=0, le=1e12)] = 1.0
-    """Of the entropy in the beginning; then tuned automatically."""
+    """Weight of the entropy in the beginning; then tuned automatically."""
     failure_cost: NonNegative = 0.0
     """Subtracted from the reward when an episode is given up; without it, giving up early can pay."""
     physics: bool = True

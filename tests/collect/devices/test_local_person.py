@@ -153,7 +153,7 @@ def test_the_stop_and_its_release(device):
     driven.main.presses = ["b" if device == "gamepad" else "space"]
     assert driven.act() is EpisodeEvent.PAUSE
     assert driven.person.phase is Phase.STOPPED
-    assert "emergency stop" in driven.shown()
+    assert "STOPPED" in driven.shown()
     driven.push(0.0)
     driven.main.presses = [START[device]]
     assert driven.act() is EpisodeEvent.PAUSE
