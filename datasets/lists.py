@@ -1,7 +1,7 @@
 """Lists on a command line: by comma or space alike."""
 
+import os
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 from tyro.constructors import PrimitiveConstructorSpec
@@ -14,7 +14,7 @@ def split_list(words: Sequence[str]) -> tuple[str, ...]:
 
 
 def _split_word(word: str) -> list[str]:
-    if "," in word and Path(word).exists():
+    if "," in word and os.path.exists(word):
         return [word]
     depth, parts = 0, [""]
     for letter in word:

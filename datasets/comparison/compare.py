@@ -67,7 +67,7 @@ class Comparison:
     @property
     def unlike(self) -> tuple[str, ...]:
         """The differences for which nothing is ranked: tasks, robots."""
-        return unlike(self.everything.groups)
+        return unlike(self.everything.collected)
 
     @property
     def colours(self) -> dict[str, str]:

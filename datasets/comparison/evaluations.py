@@ -145,8 +145,8 @@ def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Condition]:
                 policy = f"checkpoint of draw {entry.dataset_draw}, training seed {entry.training_seed}"
                 said = {"task": content.get("task", ""), policy: entry.checkpoint} | under.get(label, {})
                 for name, value in said.items():
-                    if value and value != (before := kinds.setdefault((label, name), value)):
-                        raise HandrailError(f"{of}: expected {name} {before!r} as before, got {value!r}")
+                    if value not in ("", None) and value != (was := kinds.setdefault((label, name), value)):
+                        raise HandrailError(f"{of}: expected {name} {was!r} as before, got {value!r}")
                 _add(found.setdefault(label, {}), entry, of)
     return {label: Condition(label, tuple(known.values())) for label, known in found.items()}
 

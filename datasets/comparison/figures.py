@@ -75,7 +75,7 @@ def draw_values(
 
 
 def _over_time(comparison: Comparison, height: float) -> Panel:
-    axes, groups = new_figure(_WIDTH, height).subplots(), comparison.everything.groups
+    axes, groups = new_figure(_WIDTH, height).subplots(), comparison.everything.collected
     unknown = any(episode.success is None for group in groups for episode in group.episodes)
     for group in groups:
         colour = comparison.colours[group.label]

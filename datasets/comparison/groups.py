@@ -138,7 +138,7 @@ def _value(episode: Episode, by: str, root: str) -> str:
     known = [name for name in episode.meta if "/" not in name]
     if by in known:
         value = episode.meta[by]
-        return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+        return "; ".join(map(str, value if isinstance(value, list) else [value])) or "none"
     if isinstance(episode, Demonstration) and by == "mode" and episode.has("mode"):
         return episode.modes or "none"
     raise HandrailError(f"dataset {root!r}: unknown column {by!r}, expected one of {', '.join(known)}")

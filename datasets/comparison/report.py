@@ -11,10 +11,11 @@ from handrail.datasets.presentation.markup import folded, items, page, paragraph
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure, Value
 from handrail.datasets.statistics.resampling import Interval
-from handrail.datasets.storage.atomic import explained, write_whole
+from handrail.datasets.storage.atomic import explained, remove, write_whole
 from handrail.datasets.storage.csv_file import csv_text
 
 Rows = Sequence[Mapping[str, Any]]
+_TABLES = {"differences.csv", "episodes.csv", "trials.csv"}
 
 
 def shown(value: Value, *more: str) -> Cell:
@@ -177,6 +178,8 @@ class Report:
         with explained(f"--output {str(folder)!r}: expected a folder that can be written"):
             for file, text in texts.items():
                 write_whole(folder / file, text.encode())
+            for file in _TABLES - texts.keys():
+                remove(folder / file)
         return [folder / file for file in texts]
 
 

@@ -34,8 +34,8 @@ def collection_table(view: EpisodeChoice) -> Table:
             label: ", ".join(f"{reason} ({count})" for reason, count in each) or DASH
             for label, each in reasons.items()
         },
-        "task": {group.label: shown_tasks(group.tasks) for group in view.groups},
-        "robot": {group.label: group.info.robot_type or DASH for group in view.groups},
+        "task": {group.label: shown_tasks(group.tasks) for group in view.collected},
+        "robot": {group.label: group.info.robot_type or DASH for group in view.collected},
     }
     return report.values_table(view.collecting, rows=rows)
 

@@ -4,7 +4,6 @@ LeRobot's dataset and the card are sent. `.damaged/`, `.handrail/` and all else 
 stay, and episodes of a user study's participants are not sent at all.
 """
 
-import os
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from huggingface_hub import HfApi
 
 from handrail.controllers.errors import HandrailError, message_of, restated
 from handrail.controllers.regular_file import regular
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.markdown import markdown_table, markdown_text
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
@@ -104,11 +104,9 @@ def prepare(
     said = _write_card(root, repo_id, license_id)
     names = [path.relative_to(root).as_posix() for path in sorted(root.rglob("*")) if path.is_file()]
     files = [name for name in names if _is_sent(name)]
-    home = os.path.realpath(root)
-    if linked := [name for name in files if os.path.realpath(root / name) != os.path.join(home, name)]:
-        raise HandrailError(
-            f"{str(root / linked[0])!r}: expected a file of the dataset, found a link; nothing is sent"
-        )
+    foreign = Layout(root).foreign(read_info(root).features)
+    if mixed := [name for name in foreign if _is_sent(name) or (root / name).is_symlink()]:
+        raise HandrailError(f"{str(root / mixed[0])!r}: no file of the dataset, or a link; move it away")
     tops, sent = ({name.split("/")[0] for name in some} for some in (names, files))
     size = sum((root / name).stat().st_size for name in files)
     stays = tuple(sorted(tops - sent))

@@ -7,6 +7,7 @@ first of them. Two hidden folders are Handrail's own: `.handrail` (files being w
 """
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 
 FILES_IN_A_CHUNK = 1000
@@ -18,6 +19,10 @@ DAMAGED = ".damaged"
 FOLDERS = ("data", "videos", "meta")  # of a dataset; what else lies beside them is not touched
 
 NUMBERED = r"chunk-([0-9]{3}|[1-9][0-9]{3,})/file-([0-9]{3})"  # as these patterns write it: one name a file
+_OURS = re.compile(
+    rf"(\.damaged/[^/]+/)?((data|meta/episodes)/{NUMBERED}\.parquet|videos/(?P<camera>[^/]+)/{NUMBERED}\.mp4)"
+    r"|meta/(info\.json|stats\.json|tasks\.parquet|handrail\.json|preview\.webp)"
+)
 
 
 def chunk_and_file(episode: int) -> tuple[int, int]:
@@ -67,6 +72,15 @@ class Layout:
     def relative(self, path: Path) -> str:
         """Return a path inside the dataset as text, with forward slashes."""
         return path.relative_to(self.root).as_posix()
+
+    def foreign(self, features: Collection[str]) -> list[str]:
+        """Return all among the files of a dataset with these features, or in quarantine, that is none."""
+        tops = [self.root / name for name in (*FOLDERS, DAMAGED)]
+        found = {path: path.is_symlink() for top in tops for path in (top, *top.rglob("*"))}
+        names = {self.relative(path): linked for path, linked in found.items() if linked or path.is_file()}
+        matches = {name: _OURS.fullmatch(name) for name, linked in names.items() if not linked}
+        ours = {name for name, match in matches.items() if match and match["camera"] in (None, *features)}
+        return sorted(names.keys() - ours)
 
     def _numbered(self, pattern: str, episode: int, **keys: str) -> Path:
         chunk, file = chunk_and_file(episode)

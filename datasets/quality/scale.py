@@ -103,11 +103,6 @@ class Scale:
                 self._parts[name] = error
 
     @cached_property
-    def action_range(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest value of each entry of the action, `(a,)` each; the same for a switch."""
-        return self.part("action").range
-
-    @cached_property
     def input_scale(self) -> FloatArray:
         """Largest input of each axis, `(u,)`."""
         return np.array([np.abs(each).max() for each in self.part("inputs").values])

@@ -30,7 +30,7 @@ def saturation(episode: Demonstration, scale: Scale) -> float:
     a gripper's command, have no range and do not count. The true limits are not part of LeRobot's format: a
     limit that was never reached is not known.
     """
-    action, (low, high) = episode.matrix("action"), scale.action_range
+    action, (low, high) = episode.matrix("action"), scale.part("action").range
     span = high - low
     if not (span > 0).any():
         raise DoesNotApply("no entry of the action takes more than two values")

@@ -67,7 +67,7 @@ def check_report(root: str | Path) -> list[str]:
         faults = [*(f"{name}: missing" for name in sorted(_missing(info))), *_unreadable(info)]
     else:
         advice = f"if another tool wrote it on purpose, {repair} takes it as it is"
-        other = f"other content than was saved, but the right frames; {advice}"
+        other = f"written anew, as many frames of like content; {advice}"
         unknown = [f"{found.layout.relative(path)}: no file of a LeRobot dataset" for path in found.unknown]
         faults = [*found.damage, *(f"{name}: {other}" for name in found.rewritten), *unknown]
     layout = Layout(info.root)

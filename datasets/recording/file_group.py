@@ -5,8 +5,6 @@ encoded in another way, and where LeRobot would not find a picture of a long vid
 read or written again.
 """
 
-from collections.abc import Iterable
-from contextlib import closing
 from dataclasses import replace
 
 from handrail.controllers.errors import HandrailError
@@ -24,33 +22,17 @@ from handrail.datasets.storage.atomic import make_folder, remove, write_synced
 MOST_ROWS, MOST_VIDEO = 100 * 2**20, 200 * 2**20  # [byte] of a file
 
 
-def write_file_groups(
-    layout: Layout, manifest: Manifest, slices: Iterable[EpisodeSlice], types: ColumnTypes
-) -> Totals:
-    """Write episodes in one pass into a folder that nobody reads before it is finished.
+class GroupWriter:
+    """Writes one file group after the other, into a folder that nobody reads before it is finished.
 
     Args:
-        layout: The folder; its staging folder is there.
+        layout: Of the folder; its staging folder is there.
         manifest: The schema.
-        slices: The episodes, in order.
         types: Of the extra columns.
 
-    Returns:
-        What they add up to.
-
-    Raises:
-        HandrailError, ValueError: One does not fit.
-        OSError: The disk does not take it.
+    Attributes:
+        totals: What all episodes so far add up to.
     """
-    with closing(_GroupWriter(layout, manifest, types)) as writer:
-        for each in slices:
-            writer.add(each)
-        writer.finish()
-    return writer.totals
-
-
-class _GroupWriter:
-    """Writes one file group after the other."""
 
     def __init__(self, layout: Layout, manifest: Manifest, types: ColumnTypes):
         self._layout, self._manifest, self._types = layout, manifest, types
@@ -62,7 +44,12 @@ class _GroupWriter:
         self.totals = self._before = Totals()  # of all episodes; of those before the group
 
     def add(self, piece: EpisodeSlice) -> None:
-        """Append an episode."""
+        """Append an episode.
+
+        Raises:
+            HandrailError, ValueError: It does not fit.
+            OSError: The disk does not take it.
+        """
         stretches = {key: self._stretch(piece, key) for key in piece.videos}
         rows = self._group(piece, stretches)
         known = {name: value for name, value in piece.columns.items() if value is not None}

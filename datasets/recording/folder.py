@@ -1,20 +1,16 @@
 """Whether a folder may become a dataset, emptying one that the user gave up, and its quarantine."""
 
 import os
-import re
 from collections.abc import Iterable
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.layout import DAMAGED, FOLDERS, NUMBERED, STAGING, Layout
+from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
+from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.recording.survey import shortened
 from handrail.datasets.storage.atomic import check_room, move, remove
 from handrail.datasets.storage.lock import LOCK_NAME
 
-_OURS = re.compile(
-    rf"(\.damaged/[^/]+/)?((data|meta/episodes)/{NUMBERED}\.parquet|videos/[^/]+/{NUMBERED}\.mp4)"
-    r"|meta/(info\.json|stats\.json|tasks\.parquet|handrail\.json|preview\.webp)"
-)
 _GIVEN_UP = "episodes"  # the episode rows of a dataset that is being cleared, in the staging folder
 
 
@@ -47,7 +43,7 @@ def check_target(layout: Layout, overwrite: bool) -> None:
             f"dataset {str(root)!r} was not recorded by Handrail (no meta/handrail.json): never removed;"
             " choose another root"
         )
-    if foreign := foreign_files(layout):
+    if foreign := layout.foreign(read_manifest(layout).features):
         raise HandrailError(
             f"dataset {str(root)!r}: found files that Handrail did not write, {shortened(foreign, ', ')};"
             " --overwrite removes only its own files: move this away, or choose another root"
@@ -129,11 +125,3 @@ def next_damaged(layout: Layout) -> Path:
     """Return the next folder below `.damaged`."""
     there = [int(path.name) for path in layout.damaged.glob("*") if path.name.isdecimal()]
     return layout.damaged / f"{max(there, default=-1) + 1:03d}"
-
-
-def foreign_files(layout: Layout) -> list[str]:
-    """Return what lies among a dataset's files, or among those in quarantine, and is none of them."""
-    tops = [layout.root / name for name in (*FOLDERS, DAMAGED)]
-    found = [path for top in tops for path in (top, *top.rglob("*")) if path.is_symlink() or path.is_file()]
-    ours = {path for path in found if not path.is_symlink() and _OURS.fullmatch(layout.relative(path))}
-    return sorted(layout.relative(path) for path in found if path not in ours)

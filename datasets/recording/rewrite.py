@@ -7,7 +7,7 @@ short before that, nothing has changed; after it, `settle` finishes what is left
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
@@ -16,8 +16,8 @@ from handrail.datasets.format.info_file import Encodings, summary_files
 from handrail.datasets.format.layout import FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import ColumnTypes, Totals
-from handrail.datasets.recording.file_group import write_file_groups
-from handrail.datasets.recording.folder import clear_staging, foreign_files, is_dataset, next_damaged
+from handrail.datasets.recording.file_group import GroupWriter
+from handrail.datasets.recording.folder import clear_staging, is_dataset, next_damaged
 from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, sync, write_whole
 from handrail.datasets.storage.lock import FolderLock, HeldError
@@ -50,7 +50,11 @@ def write_anew(
         OSError: The disk does not take it.
     """
     with drafted(root, in_place) as draft:
-        totals = write_file_groups(draft, manifest, slices, types)
+        with closing(GroupWriter(draft, manifest, types)) as writer:
+            for each in slices:
+                writer.add(each)
+            writer.finish()
+        totals = writer.totals
         if not totals.episodes and damaged is None:
             raise HandrailError(f"{str(root)!r}: expected at least one episode; nothing was written")
         summary = summary_files(draft, manifest, totals, encodings)
@@ -59,7 +63,7 @@ def write_anew(
                 write_whole(path, data, draft.staging)
         if in_place:
             _copy_beside(root, draft.root)
-            for name in foreign_files(Layout(root)):
+            for name in Layout(root).foreign(manifest.features):
                 if not (root / name).is_symlink():  # it may stand for a file of the old dataset
                     _second_name(root / name, draft.root / name)
         quarantine = next_damaged(draft)

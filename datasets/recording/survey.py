@@ -68,16 +68,20 @@ class Survey:
         return tuple(name for group in self.groups if not all(group.faults) for name in group.rewritten)
 
     def require_whole(self) -> None:
-        """Check that no episode is damaged."""
-        if not self.damage:
-            return
-        root = self.layout.root
-        what = "was copied in part" if all("missing" in each for each in self.damage) else "is damaged"
-        raise HandrailError(
-            f"dataset {str(root)!r} {what}: {len(self.damage)} of {self.episodes} episodes are not whole"
-            f" ({shortened(self.damage)}); nothing has been changed; copy it again, see what handrail-edit"
-            f" repair {shlex.quote(str(root))} can mend, or go on without them with its --set_aside"
-        )
+        """Check that no episode is damaged, nor its rows written by another tool."""
+        root, repair = self.layout.root, f"handrail-edit repair {shlex.quote(str(self.layout.root))}"
+        if self.damage:
+            what = "was copied in part" if all("missing" in each for each in self.damage) else "is damaged"
+            raise HandrailError(
+                f"dataset {str(root)!r} {what}: {len(self.damage)} of {self.episodes} episodes are not whole"
+                f" ({shortened(self.damage)}); nothing has been changed; copy it again, see what {repair} can"
+                " mend, or go on without them with its --set_aside"
+            )
+        if anew := [name for name in self.rewritten if name.startswith("data/")]:
+            raise HandrailError(
+                f"dataset {str(root)!r}: another tool wrote {shortened(anew, ', ')} anew; if the rows are"
+                f" right, {repair} takes them as they are"
+            )
 
 
 def shortened(texts: Sequence[str], comma: str = "; ") -> str:
@@ -89,7 +93,9 @@ def shortened(texts: Sequence[str], comma: str = "; ") -> str:
 def survey(layout: Layout, manifest: Manifest, sums: Checksums) -> Survey:
     """Look at everything, change nothing; remember the checksums."""
     rows = row_files(layout)
-    streams = sorted((*layout.root.glob("videos/*/*/*.mp4"), *layout.root.glob("data/*/*.parquet")))
+    folders = [layout.root / "videos" / key for key in video_keys(manifest.features)]
+    videos = [path for folder in folders for path in folder.glob("*/*.mp4")]
+    streams = sorted((*videos, *layout.root.glob("data/*/*.parquet")))
     heads = _heads({number: path for path in rows if (number := episode_of(path)) is not None})
     groups = list(heads.values())
     numbered = {path: number for path in streams if (number := episode_of(path)) is not None}

@@ -211,9 +211,10 @@ class EpisodeWriter:
     def erase_if_empty(self) -> None:
         """Remove the dataset if it has no episode; one whose saving was interrupted is left for `resume`.
 
-        One with episodes that were set aside stays too.
+        One with episodes that were set aside, or with files of others, stays too.
         """
-        if self.num_episodes or self._unusable or self._layout.damaged.exists():
+        foreign = self._layout.foreign(self.features)
+        if self.num_episodes or self._unusable or self._layout.damaged.exists() or foreign:
             return
         with explained(f"cannot remove the empty dataset {str(self.root)!r}"):
             self._discard()

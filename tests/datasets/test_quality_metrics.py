@@ -174,7 +174,7 @@ def test_touching_an_end_once_is_no_saturation():
 
 
 def saturation(action, low, high):
-    return value(tracking.saturation, {"action_range": (low, high)}, action=action)
+    return value(tracking.saturation, {"part": lambda _: SimpleNamespace(range=(low, high))}, action=action)
 
 
 def test_variation_ratio():

@@ -142,6 +142,8 @@ def test_every_setting_of_many_names_is_such_a_list(config):
 def test_brackets_and_names_of_folders_keep_their_commas(tmp_path, monkeypatch):
     words = ["down_dims=[64, 128],n=3", '{"a": [1], "b": [2, 3]}', "x"]
     assert split_list(words) == ("down_dims=[64, 128]", "n=3", '{"a": [1], "b": [2, 3]}', "x")
+    many = tuple(map(str, range(200)))  # longer than a file's name may be
+    assert split_list([",".join(many)]) == many
     monkeypatch.chdir(tmp_path)
     Path("a,b").mkdir()
     assert split_list(["a,b", "c,d"]) == ("a,b", "c", "d")

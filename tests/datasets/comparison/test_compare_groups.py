@@ -1,11 +1,13 @@
 """What `handrail-compare` compares: groups of episodes, matched in number and time, paired by their seeds."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from compare_helpers import handrail_dataset
+from compare_helpers import evaluations, handrail_dataset
 from datasets_helpers import create, frame_of
 
 from handrail.controllers.errors import HandrailError
@@ -18,8 +20,11 @@ from handrail.datasets.comparison.collection import (
 )
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.evaluations import read_evaluations
+from handrail.datasets.comparison.figures import answer_panels
 from handrail.datasets.comparison.groups import load_groups
 from handrail.datasets.comparison.headline import cautions
+from handrail.datasets.comparison.page import dataset_report
 from handrail.datasets.format.schema import Feature
 
 
@@ -90,6 +95,46 @@ def test_success_only(ours, tmp_path):
     view = comparison.everything
     assert [len(group.episodes) for group in view.groups] == [12, 6]
     assert [len(group.episodes) for group in view.collected] == [12, 12]
+    lines = answer_panels(comparison)[1].figure.axes[0].lines
+    minutes = [group.seconds / 60 for group in view.collected]
+    assert [line.get_xdata()[-1] for line in lines[::2]] == pytest.approx(minutes)  # failures take time, too
+
+
+def test_success_only_ranks_no_unlike_tasks(ours):
+    """Tasks in which every attempt failed count as well."""
+    quick, slow = load_groups(ours)
+    other = [replace(e, meta=e.meta | {"tasks": ["push"]}) for e in slow.episodes if not e.success]
+    both = [replace(slow, episodes=(*filter(lambda e: e.success, slow.episodes), *other)), quick]
+    comparison = compare(CompareConfig(tuple(ours), success_only=True))
+    chosen = replace(comparison.everything, collected=both)
+    assert replace(comparison, views=(chosen, *comparison.views[1:])).unlike == ("tasks",)
+
+
+def test_what_an_episode_does_not_have_is_called_none(tmp_path):
+    groups = load_groups([handrail_dataset(tmp_path / "set", 2, "ee", 4)], "failure_reason")
+    assert {group.label for group in groups} == {"timeout", "none"}
+
+
+def test_a_report_leaves_no_table_of_the_one_before(ours, tmp_path):
+    report = dataset_report(compare(CompareConfig(tuple(ours))))
+    report.write(tmp_path)
+    assert (tmp_path / "episodes.csv").exists()
+    (tmp_path / "notes.csv").write_text("mine")
+    replace(report, units={}).write(tmp_path)
+    assert sorted(path.name for path in tmp_path.glob("*.csv")) == ["differences.csv", "notes.csv"]
+
+
+@pytest.mark.parametrize("values", [(False, True), (0, 0.3)])
+def test_conditions_of_nothing_are_conditions(tmp_path, values):
+    files = []
+    for value in values:
+        path = tmp_path / f"{value}.json"
+        said = json.loads(Path(evaluations(path, 1, ee=0.5)).read_text())
+        path.write_text(json.dumps(said | {"conditions": {"ee": {"pushed": value}}}))
+        files.append(path)
+    for some in (files, files[::-1]):
+        with pytest.raises(HandrailError, match=r"expected pushed .* as before"):
+            read_evaluations(some)
 
 
 def test_episodes_of_several_persons_are_said_to_be_alike(ours):

@@ -112,7 +112,7 @@ def test_a_changed_number_is_damage_whatever_column_it_is_in(tmp_path):
         path.write_bytes(changed)
         faults = check_report(root)
         assert faults, column.path_in_schema
-        assert not any("but the right frames" in fault for fault in faults), column.path_in_schema
+        assert not any("of like content" in fault for fault in faults), column.path_in_schema
     path.write_bytes(raw)
     assert not check_report(root)
 

@@ -41,7 +41,7 @@ def test_nothing_is_sent_unless_asked(root, hub):
     said = push(root).stdout
     assert (hub.sent, hub.repo) == ({}, {})
     assert "nothing was sent; --upload sends it" in said
-    assert "me/reach (private): 17 files" in said
+    assert "me/reach (private, cc-by-4.0): 17 files" in said
 
 
 def test_the_dataset_is_sent_and_nothing_else(root, hub):
@@ -123,7 +123,7 @@ def test_without_opengl_the_card_has_no_picture_and_one_line_says_so(tmp_path, m
     monkeypatch.setattr("handrail.collect.world.env.Painter", no_library)
     said = push(root).stdout.splitlines()
     assert said[0].startswith("The card gets no picture: cameras need OpenGL, which is missing here")
-    assert said[1].startswith(f"{root} as me/reach (private): ")
+    assert said[1].startswith(f"{root} as me/reach (private, cc-by-4.0): ")
     assert "preview" not in (root / "README.md").read_text()
     assert not (root / "meta/preview.webp").exists()
 
@@ -172,12 +172,22 @@ def test_a_refusal_of_the_hub_is_one_line(root, hub):
     assert "the hub did not take me/reach: 401 Client Error" in said
 
 
+@pytest.mark.parametrize(
+    "name", ["data/chunk-000/old/file-000.parquet", "videos/face/chunk-000/file-000.mp4"]
+)
+def test_files_of_others_with_names_like_ours_are_not_sent(root, hub, name):
+    (root / name).parent.mkdir(parents=True)
+    (root / name).write_text("private")
+    assert f"{name}': no file of the dataset" in push(root, "--upload", code=2).stderr
+    assert not hub.sent
+
+
 def test_links_are_not_followed(root, hub, tmp_path):
     (tmp_path / "secret").write_text("private")
     stats = Layout(root).stats
     stats.rename(tmp_path / "stats.json")
     stats.symlink_to(tmp_path / "stats.json")
-    assert "found a link" in push(root, "--upload", code=2).stderr
+    assert "no file of the dataset, or a link" in push(root, "--upload", code=2).stderr
     assert not hub.sent
 
 

@@ -14,7 +14,7 @@ from datasets_helpers import (
 )
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.merge import drop_episodes
+from handrail.datasets.editing.merge import drop_episodes, merge_datasets
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes, read_frames
@@ -61,7 +61,7 @@ def test_episodes_set_aside_outlive_a_recording_without_an_episode(tmp_path):
     [
         *("data/notes.txt", "data/chunk-000/mine.parquet", "videos/holiday.mp4", "meta/todo.md"),
         *(".damaged/notes.txt", ".damaged/000/data/chunk-000/mine.parquet"),
-        ".damaged/chunk-000/file-001.mp4",
+        *(".damaged/chunk-000/file-001.mp4", "videos/face/chunk-000/file-000.mp4"),
     ],
 )
 def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
@@ -74,6 +74,29 @@ def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
     (root / mine).unlink()
     create(root, overwrite=True).close()
     assert (root / "images" / "photo.png").read_text() == "mine too"
+
+
+@pytest.mark.parametrize("mine", ["videos/notes.txt", "videos/face/chunk-000/file-001.mp4"])
+def test_files_of_others_outlive_all_that_is_done_to_a_dataset(tmp_path, mine):
+    """A folder of `videos` that is no camera of the dataset is not the dataset's."""
+    root = record(tmp_path / "set", 1)
+    (root / mine).parent.mkdir(parents=True)
+    (root / mine).write_text("mine")
+    merge_datasets([root], root)
+    with resume(root) as writer:
+        record_one(writer, cameras=False)
+    assert repair(root).clean
+    assert (root / mine).read_text() == "mine"
+
+
+def test_files_of_others_outlive_a_recording_without_an_episode(tmp_path):
+    root = tmp_path / "set"
+    create(root).close()
+    (root / "videos").mkdir(exist_ok=True)
+    (root / "videos" / "notes.txt").write_text("mine")
+    with resume(root) as writer:
+        writer.erase_if_empty()
+    assert (root / "videos" / "notes.txt").read_text() == "mine"
 
 
 def test_episodes_set_aside_are_overwritten_with_the_rest(tmp_path):
