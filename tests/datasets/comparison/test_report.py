@@ -53,7 +53,11 @@ def page(alike):
 def unlike(ours, few_resamples):
     """The same comparison, but the second dataset is another task of another robot."""
     found = compare(CompareConfig(tuple(ours)))
-    return replace(found, views=[replace(view, groups=_another(view.groups)) for view in found.views])
+    views = [
+        replace(view, groups=_another(view.groups), collected=_another(view.collected))
+        for view in found.views
+    ]
+    return replace(found, views=views)
 
 
 def _another(groups):
