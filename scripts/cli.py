@@ -80,7 +80,7 @@ def run(main: Callable[[], int | None]) -> NoReturn:
             fail(f"interrupted; {error}" if isinstance(error, HandrailError) else "interrupted", INTERRUPTED)
         if isinstance(error, BrokenPipeError):
             sys.exit(FAILED)
-        if isinstance(error, HandrailError | OSError):  # such as a name that is too long
+        if isinstance(error, HandrailError | OSError | EOFError):  # a name that is too long; Ctrl-D
             fail(message_of(error), BAD_INPUT)
         raise
 

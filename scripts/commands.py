@@ -8,8 +8,6 @@ from typing import Any
 
 from handrail.controllers.registry import resolved
 
-ENTRY = "handrail.scripts.__main__:main"  # of all commands
-
 
 @dataclass(frozen=True)
 class Verb:

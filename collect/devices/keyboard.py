@@ -100,6 +100,7 @@ class KeyTerminal:
         if self._file < 0:
             return
         self.write((_KEYS_END if self.tells_releases else b"") + _FOCUS_END)
+        select.select([self._file], [], [], _SILENCE)  # what was asked is answered, and thrown away
         with contextlib.suppress(termios.error):
             termios.tcsetattr(self._file, termios.TCSAFLUSH, self._before)
         self._forget()

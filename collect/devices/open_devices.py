@@ -111,6 +111,10 @@ def _person(
         for reader in filter(None, (main, beside)):
             stack.callback(reader.close)
             reader.start()
+        tables = [reader.controls for reader in (main, beside) if reader]
+        for actions in (("start", "start_or_pause"), ("stop",)):
+            if not control_of(tables, *actions):
+                raise HandrailError(f"{config.operator}: no control to {actions[0]}; use a terminal or a map")
         stack.pop_all()
     return LocalPerson(person, main, beside, follower, bool(config.policy))
 

@@ -82,11 +82,6 @@ class LeKiwiBody:
         """Where the base really is, (3,) [m, rad]."""
         return self._env.state().q[:3]
 
-    @property
-    def speed(self) -> float:
-        """Of the base now, the larger of [m/s] and [rad/s]."""
-        return float(np.abs(self._env.state().v[:3]).max())
-
     def observation(self) -> dict[str, float]:
         """Return what LeKiwi says: joint positions, and the speeds of its wheels as the base's."""
         state, world = self._env.state(), self._env.plant

@@ -115,7 +115,7 @@ class LeKiwiLoop:
             "malformed": self.malformed,
             "messages_lost": self._commands.lost + self._answers.lost,
             "base_stops": self.stops,
-            "base_speed": self._body.speed,
+            "base_speed": max(abs(v) for name, v in self._body.observation().items() if "vel" in name),
             "episodes": self.episodes,
         }
 
@@ -150,7 +150,7 @@ class LeKiwiLoop:
             self._painted = now
             lost = self._config.lost_camera
             self._pictures = {name: b"" if name == lost else _jpeg(self._body, name) for name in cameras}
-        header = {"_cams": list(cameras), **self._body.observation()}
+        header = {"_cams": list(cameras), EPISODE: self._episode, **self._body.observation()}
         return [json.dumps(header).encode(), *(self._pictures.get(name, b"") for name in cameras)]
 
 

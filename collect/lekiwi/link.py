@@ -79,7 +79,7 @@ class Link:
         self._due, self.late = math.inf, 0
         self.asked: Callable[[], EpisodeEvent | None] = lambda: None
         self._lock, self._closed = threading.Lock(), threading.Event()
-        self._episode, self._seed = 0, 0
+        self._episode, self._seed = int(time.time()), 0  # another recorder's differ
         with restated(f"--robot_client {name}: cannot be reached"):
             client.connect()
         self._heard = self._deadline = clock()
@@ -229,7 +229,10 @@ def connect(
         def _parse_observation(self, frames: list[bytes]) -> dict[str, Any] | None:
             unsaid = dict.fromkeys(self._state_order, math.nan)
             with contextlib.suppress(AttributeError, TypeError):  # of JSON that is no table
-                return unsaid | super()._parse_observation(frames)  # pyright: ignore[reportOperatorIssue]
+                said = unsaid | super()._parse_observation(frames)  # pyright: ignore[reportOperatorIssue]
+                if config.simulated and EPISODE not in said:
+                    raise HandrailError("--client.simulated: expected handrail-lekiwi host, got a robot")
+                return said
 
     client: Any = WholeClient(settings)
     try:

@@ -31,19 +31,14 @@ class HandrailCockpit(SimTeleoperator):
     config_class = HandrailCockpitConfig
     name = "handrail_cockpit"
 
-    @property
-    def address(self) -> str:
-        """Of the page, once it is connected."""
-        return self._server.address
-
     def _made(self, robot: HandrailSim) -> Cockpit:
         check_installed(*NEEDED)
         robot.env.render_mode = "rgb_array"  # from the next episode on the robot looks as it does
         mode, say = robot.mode, Terminal().print
-        self._server = open_server(self._settings, say)
+        server = open_server(self._settings, say)
         person = Person(robot.env.model, {mode.name: mode}, mode.name)
         _keep_to_sayable_frames(person, robot, say)
-        return Cockpit(person, self._server, _REFUSED, say)
+        return Cockpit(person, server, _REFUSED, say)
 
 
 class HandrailGamepad(SimTeleoperator):

@@ -1,17 +1,21 @@
 """A LeKiwi behind a client in this process: simulated, in time that passes only when somebody sleeps."""
 
 import json
+import threading
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import pytest
 from fuzz_helpers import RudeOperator
 from processor_helpers import Clock
 
+from handrail.collect.client_config import ClientConfig
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.client_plant import ClientPlant
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import SEED, LeKiwiLoop
-from handrail.collect.lekiwi.link import Link
+from handrail.collect.lekiwi.link import Link, connect
 from handrail.collect.processor.units import robot_units
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.pick_place import PickPlace
@@ -21,6 +25,11 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
 
 ZERO = ("x.vel", "y.vel", "theta.vel")
+_MODEL = load_model("lekiwi")
+GOOD = robot_units("lekiwi", _MODEL.description).action(
+    _MODEL.description.home[3:], np.zeros(5), np.zeros(3), (0.0,)
+)
+"""What a robot at rest says."""
 
 
 class PlayedClient:
@@ -187,3 +196,21 @@ def interrupted_drive(cut: str, seconds: float, seed: int) -> tuple[list[float],
     drive(2.0, 0.12)
     link.close()
     return ahead, client.body.contacts - before
+
+
+@contextmanager
+def wired(simulated=False, **more):
+    """Yield a LeKiwi's socket of observations, and the link to it through LeRobot's own client."""
+    zmq = pytest.importorskip("zmq", reason="pip install '.[lekiwi]'")
+    with zmq.Context() as context, context.socket(zmq.PUSH) as says, context.socket(zmq.PULL) as takes:
+        here = "tcp://127.0.0.1"
+        ports = takes.bind_to_random_port(here), says.bind_to_random_port(here)
+        says.linger = takes.linger = 0
+        first = threading.Thread(
+            target=says.send_json, args=({"_cams": [], **GOOD, **more},)
+        )  # once somebody listens
+        first.start()
+        link = connect("lekiwi", ClientConfig("127.0.0.1", *ports, simulated=simulated), (), _MODEL, 50)
+        first.join()
+        yield says, link
+        link.close()

@@ -213,3 +213,13 @@ def test_an_interrupt_names_the_error_that_it_ended_in(capsys):
         cli.run(ends)
     assert ended.value.code == 130
     assert capsys.readouterr().err == "error: interrupted; --output d: No space left on device\n"
+
+
+def test_ctrl_d_at_a_question_is_one_line(capsys):
+    def asks():
+        raise EOFError("EOF when reading a line")
+
+    with pytest.raises(SystemExit) as ended:
+        cli.run(asks)
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "error: EOF when reading a line\n"

@@ -16,8 +16,9 @@ from pages import VERBS
 from places import FLOORS, ROOT, sources
 
 from handrail.controllers.registry import resolved
-from handrail.scripts.commands import COMMANDS, ENTRY
+from handrail.scripts.commands import COMMANDS
 
+ENTRY = "handrail.scripts.__main__:main"  # of all commands
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 SETUPTOOLS = PROJECT["tool"]["setuptools"]
 LINES = (ROOT / "constraints.txt").read_text().splitlines()

@@ -1,6 +1,7 @@
 """Trains an encoder on scenes that are drawn meanwhile; measures it on others."""
 
 import math
+import signal
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import asdict
@@ -190,15 +191,20 @@ class _Training:
 
 def _chunks(config: EncoderConfig, first: int, end: int) -> Iterator[Samples]:
     """Yield chunks in order, however many processes draw them: without a copy, as tensors."""
-    around: dict[str, Any] = {"multiprocessing_context": "forkserver", "prefetch_factor": 2}
+    around: dict[str, Any] = {"multiprocessing_context": "spawn", "worker_init_fn": _undisturbed}
     loader = DataLoader(
         Drawn(config),  # pyright: ignore[reportArgumentType]
         batch_size=None,
         sampler=range(first, end),
         num_workers=config.workers,
-        **(around if config.workers else {}),
+        **(around if config.workers else {}),  # spawned: they end with the training, however it ends
     )
     return ({name: each.numpy() for name, each in chunk.items()} for chunk in loader)
+
+
+def _undisturbed(worker: int) -> None:
+    """Leave Ctrl-C to the training, which saves and then ends the workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _rate(update: int, updates: int) -> float:

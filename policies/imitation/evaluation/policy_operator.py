@@ -87,7 +87,8 @@ class PolicyOperator:
         seen = view.observation
         state, around, pictures = seen["agent_pos"], seen["environment_state"], seen.get("pixels", {})
         if encoder := self._policy.encoder:
-            said = encoder.look({name: each[None] for name, each in pictures.items()}, state[None])
+            numbers = encoder.read({name: each[None] for name, each in pictures.items()})
+            said = encoder.said(numbers, state[None])
             memory = self._before(view.state.time)
             around = memory.take(said, 0)
             self._memories.append((view.state.time, memory))

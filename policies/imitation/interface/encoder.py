@@ -146,12 +146,6 @@ class Encoder:
         """A digest that tells it apart from others."""
         return hashlib.sha256(self._bytes).hexdigest()[:16]
 
-    def look(
-        self, pictures: Mapping[str, NDArray[np.uint8] | Tensor], states: FloatArray
-    ) -> dict[str, list[Said]]:
-        """Return what the pictures of T moments say, by object, of each camera; see `read` and `said`."""
-        return self.said(self.read(pictures), states)
-
     def read(self, pictures: Mapping[str, NDArray[np.uint8] | Tensor]) -> FloatArray:
         """Return the network's numbers, (T, cameras, n) float32.
 

@@ -55,7 +55,7 @@ class PolicyEncoderStep(ObservationProcessorStep, OwnStep):
             for name in reads.cameras
             if isinstance(shown.get(key := PICTURE + name), torch.Tensor)
         }
-        said = self.encoder.look(pictures, states)
+        said = self.encoder.said(self.encoder.read(pictures), states)
         self._memories += [SceneMemory(reads) for _ in states[len(self._memories) :]]
         self._forget(shown.get(_TIME))
         moments = zip(self._memories, range(len(states)), strict=False)

@@ -110,7 +110,7 @@ def in_one_line(config: TrainConfig) -> Iterator[None]:
 def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
     """Check that settings are those of a checkpoint, and its sizes still those of the preset."""
     sizes, least = resolved(config), began.sizes.steps
-    if sizes.steps < least:
+    if config.steps and sizes.steps < least:
         raise HandrailError(f"--resume with --steps {sizes.steps}: expected {least} or more, as it began")
     now = {f"--{name}": value for name, value in as_json(config).items() if name not in FREE_ON_RESUME}
     then = {f"--{name}": value for name, value in (_SINCE | dict(began.training)).items()}

@@ -4,7 +4,7 @@ import logging
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from lerobot.configs.default import DatasetConfig
@@ -44,6 +44,7 @@ def train(config: TrainConfig) -> Path:
     with in_one_line(config), FolderLock(lock, output, "handrail-train") if _MAIN else nullcontext():
         checkpoint = _begin(config)
         began = None if checkpoint is None else _checked(config, checkpoint)
+        config = replace(config, steps=config.steps or began.sizes.steps) if began else config
         weights, known = checkpoint and checkpoint / MODEL, began
         if config.init and checkpoint is None:
             weights, known = earlier_policy(config)

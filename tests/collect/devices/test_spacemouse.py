@@ -1,12 +1,22 @@
 """Laws of the SpaceMouse: its axes as the robot's, silence and garbage move nothing, why there is none."""
 
 import sys
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
-from device_players import HID, PlayedHid, recorded
+from device_players import HID, PlayedHid, PlayedTerminal, recorded
+from driven_person import MODEL
 
+from handrail.collect.config import RecordConfig
+from handrail.collect.devices.keyboard import Keyboard
+from handrail.collect.devices.open_devices import open_device
 from handrail.collect.devices.spacemouse import SpaceMice, SpaceMouse
+from handrail.collect.operators.modes import MODES
+from handrail.collect.teleop_config import TeleopConfig
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.registry import fitting
 
 FORWARD = bytes.fromhex("010000a2fe0000")  # y = −350, and it counts backward
 
@@ -143,3 +153,25 @@ def test_without_hidapi_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, HID, None)
     with pytest.raises(HandrailError, match=r"expected hidapi, found none; .*\[devices\]"):
         SpaceMouse().open()
+
+
+@pytest.mark.parametrize(
+    ("operator", "actions", "missing"),
+    [
+        ("spacemouse", "", "start"),  # and without a terminal nothing else could say it
+        ("keyboard", 'enter = ""', "start"),
+        ("keyboard", 'space = "grip"', "stop"),
+    ],
+)
+def test_devices_that_cannot_begin_or_stop_are_refused(
+    played, tmp_path, monkeypatch, operator, actions, missing
+):
+    keyboard = partial(Keyboard, PlayedTerminal())
+    monkeypatch.setattr("handrail.collect.devices.open_devices.Keyboard", keyboard)
+    monkeypatch.setattr("handrail.collect.devices.open_devices.has_terminal", lambda: False)
+    (tmp_path / "mine.toml").write_text(f"[actions]\n{actions}\n")
+    teleop = TeleopConfig(map=str(tmp_path / "mine.toml"))
+    config = RecordConfig(task="reach", mode="ee", operator=operator, teleop=teleop)
+    env: Any = SimpleNamespace(model=MODEL)
+    with pytest.raises(HandrailError, match=f"^{operator}: no control to {missing}; use a ter"):
+        open_device(config, env, print, fitting(MODES, 1))

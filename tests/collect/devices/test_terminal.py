@@ -75,3 +75,18 @@ def test_without_a_terminal_it_says_what_to_do(monkeypatch):
         assert not has_terminal()
         with pytest.raises(HandrailError, match=r"expected a terminal to read keys from, found none; .*brow"):
             KeyTerminal().open()
+
+
+def test_the_answer_of_a_terminal_that_is_let_go_at_once_is_not_typed_into_the_shell():
+    code = "from handrail.collect.devices.keyboard import KeyTerminal as K; k = K(); k.open(); k.close()"
+    code += "; import time; time.sleep(0.5); print('left', flush=True)"
+    master, slave = pty.openpty()
+    words = [sys.executable, "-c", code]
+    with subprocess.Popen(words, stdin=slave, stdout=slave, stderr=slave, preexec_fn=own_terminal):
+        said = until(master, b"\x1b[c")
+        time.sleep(0.02)
+        os.write(master, b"\x1b[?62;22c")
+        said += until(master, b"left")
+    os.close(master)
+    os.close(slave)
+    assert b"62;22c" not in said  # echoed

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command_helpers import command
 from driven_person import Driven
-from lekiwi_helpers import ZERO, PlayedClient
+from lekiwi_helpers import GOOD, ZERO, PlayedClient, wired
 from processor_helpers import PERIOD
 
 from handrail.collect.client_config import ClientConfig
@@ -34,7 +34,6 @@ MODEL = load_model("lekiwi")
 UNITS = robot_units("lekiwi", MODEL.description)
 FASTEST, BASE = MODEL.description.limits.velocity, 3
 HOME = MODEL.description.home
-GOOD = UNITS.action(HOME[BASE:], np.zeros(5), np.zeros(3), (0.0,))
 JUNK = [{}, [], None, 5, {"_cams": []}, {"_cams": [], **GOOD, "x.vel": "fast"}, {"_cams": [[1]]}]
 JUNK += [{"_cams": [], **{name: GOOD[name] for name in GOOD if name != lacking}} for lacking in GOOD]
 
@@ -95,20 +94,8 @@ def test_a_zero_for_every_key_is_no_observation():
 
 @pytest.fixture
 def wire():
-    """Yield a LeKiwi's socket of observations, and the link to it through LeRobot's own client."""
-    zmq = pytest.importorskip("zmq", reason="pip install '.[lekiwi]'")
-    with zmq.Context() as context, context.socket(zmq.PUSH) as says, context.socket(zmq.PULL) as takes:
-        here = "tcp://127.0.0.1"
-        ports = takes.bind_to_random_port(here), says.bind_to_random_port(here)
-        says.linger = takes.linger = 0
-        first = threading.Thread(
-            target=says.send_json, args=({"_cams": [], **GOOD},)
-        )  # once somebody listens
-        first.start()
-        link = connect("lekiwi", ClientConfig("127.0.0.1", *ports), (), MODEL, 50)
-        first.join()
-        yield says, link
-        link.close()
+    with wired() as found:
+        yield found
 
 
 HOST = """

@@ -3,19 +3,23 @@
 import json
 import math
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
 from command_helpers import refused
+from lekiwi_helpers import PlayedClient, wired
 
 from handrail.collect.lekiwi import host
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT, LeKiwiLoop, Wire
+from handrail.collect.lekiwi.link import Link
 from handrail.collect.processor.units import robot_units
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
 
 STILL = {"x.vel": 0.0, "y.vel": 0.0, "theta.vel": 0.0}
 AHEAD = {**STILL, "x.vel": 0.1}
@@ -99,6 +103,27 @@ def test_a_seed_begins_an_episode_once():
     assert hosted.body.time == pytest.approx(1.0, abs=0.1)
     ages = hosted.loop.summary()["command_age_ms"]
     assert ages["p100"] == pytest.approx(1000.0, abs=40.0)  # the same message again is no command
+
+
+def test_a_second_recorder_s_first_episode_begins():
+    """Of another process, which counts anew."""
+    hosted = Hosted()
+    for seed, clock in ((111, 1000.0), (222, 1060.0)):
+        client = PlayedClient()
+        with mock.patch("time.time", lambda clock=clock: clock):
+            far = Link(client, "lekiwi", load_model("lekiwi"), 0.05, True, client.clock, client.sleep)
+            far.begin(seed)
+            far.exchange(())
+        hosted.go(0.1, json.dumps(client.sent[-1]).encode())
+    assert [each["seed"] for each in hosted.loop.episodes] == [0, 111, 222]
+
+
+def test_a_robot_is_not_driven_as_a_simulation():
+    """A script may drive that one, with nobody to stop it."""
+    with pytest.raises(HandrailError, match="expected handrail-lekiwi host, got a robot"), wired(True):
+        pass
+    with wired(True, **{EPISODE: 0.0}) as (_, link):
+        assert not link.body.trouble
 
 
 def test_a_slow_network_is_late_by_as_much_and_loses_its_share():

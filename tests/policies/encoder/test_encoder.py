@@ -50,7 +50,7 @@ def moments(count=3, seed=0):
 def test_it_tells_of_what_has_a_pose_or_a_position_and_of_nothing_else():
     said, (pictures, states) = encoder(), moments()
     assert [name for name, _, _ in said.reads.objects] == ["cube", "bin", "cube_table", "bin_table"]
-    numbers = SceneMemory(said.reads).take(said.look(pictures, states), 0)
+    numbers = SceneMemory(said.reads).take(said.said(said.read(pictures), states), 0)
     names = said.reads.interface.environment_names
     zero = {name.split(".")[0] for name, value in zip(names, numbers, strict=True) if value == 0.0}
     assert zero == {"obstacle_0", "obstacle_1", "obstacle_2"}
@@ -64,7 +64,7 @@ def test_its_file_is_all_that_it_is(tmp_path):
     assert loaded.reads == one.reads
     assert loaded.digest == one.digest != encoder(1).digest
     assert (tmp_path / "a.safetensors").read_bytes() == (tmp_path / "b.safetensors").read_bytes()
-    first, second = (each.look(pictures, states)["cube"][0] for each in (one, loaded))
+    first, second = (each.said(each.read(pictures), states)["cube"][0] for each in (one, loaded))
     np.testing.assert_allclose(first.position, second.position, atol=5e-3)  # float16
 
 
@@ -75,7 +75,8 @@ def test_estimates_move_with_the_robot():
     elsewhere = states.copy()
     for name, by in (("x.pos", 1.0), ("tool.x", 1.0)):
         elsewhere[:, names.index(name)] += by
-    for here, there in zip(*(one.look(pictures, each)["cube"] for each in (states, elsewhere)), strict=True):
+    said = [one.said(one.read(pictures), each)["cube"] for each in (states, elsewhere)]
+    for here, there in zip(*said, strict=True):
         np.testing.assert_allclose(there.position - here.position, [[1.0, 0.0, 0.0]], atol=1e-5)
         np.testing.assert_allclose(there.spread, here.spread)
         np.testing.assert_allclose(np.array(there.rotation), np.array(here.rotation), atol=1e-6)
@@ -89,10 +90,9 @@ def test_estimates_move_with_the_robot():
     ],
 )
 def test_other_pictures_are_refused(change, words):
-    pictures, states = moments()
-    change(pictures)
+    change(pictures := moments()[0])
     with pytest.raises(HandrailError, match=words):
-        encoder().look(pictures, states)
+        encoder().read(pictures)
 
 
 def test_a_file_of_something_else_is_refused(tmp_path):
@@ -213,7 +213,7 @@ def test_in_a_checkpoint_it_says_the_same(tmp_path):
     for times in ([0.0, 0.0], [0.05, 0.05], [0.10, 0.0]):
         if times[1] == 0.0:
             memories[1] = SceneMemory(one.reads)
-        told = one.look(pictures, states)
+        told = one.said(one.read(pictures), states)
         expected = np.stack([memory.take(told, row) for row, memory in enumerate(memories)])
         found = step({"observation": shown | {"observation.time": torch.tensor(times)[:, None]}})
         np.testing.assert_array_equal(found["observation"][ENVIRONMENT].numpy(), expected)

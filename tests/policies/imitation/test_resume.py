@@ -126,3 +126,12 @@ def interrupted(at):
         return update_policy(*arguments)
 
     return update
+
+
+def test_without_steps_a_training_goes_on_to_the_length_it_began_with(trained, tmp_path):
+    """Not to that of the preset, on another learning rate."""
+    folder, config = trained
+    again = dataclasses.replace(cut(config, tmp_path / "cut"), steps=0, resume=True)
+    resumed = train(again)
+    assert read_meta(resumed).steps == config.steps
+    assert weights(resumed) == weights(folder)
