@@ -74,7 +74,7 @@ class ModeController:
         """Return the model that means the hand which is commanded; the masked MPC knows them all."""
         if not CONTROLLERS.find(self._mode.controller).objectives:
             for number, hand in enumerate(self._model.description.hands):
-                if mask[self._channels.hand_slice(number)].any():
+                if mask.ndim and mask[self._channels.hand_slice(number)].any():
                     return self._model.with_hand(hand.name)
         return self._model
 

@@ -19,6 +19,8 @@ OUTCOME = (
 )
 """The outcome in an episode's metadata."""
 
+_AT_ONCE = 4  # frames written in a period
+
 
 class _Aside:
     """Pictures of frames that an undo may take back, in a file: minutes of them do not fit into memory.
@@ -84,7 +86,7 @@ class Recorder:
             self._aside = self._aside or _Aside(self.writer.staging)
             frame = self._aside.put(frame)
         self._undoable.append(frame)
-        self._add(frame.safe)
+        self._add(min(frame.safe, self.writer.open_frames + _AT_ONCE))  # the loop does not wait for more
 
     def _add(self, safe: int) -> None:
         """Write the frames up to a number."""

@@ -31,7 +31,7 @@ def library() -> Path:
 def build() -> Path:
     """Build the library where it is missing; return its path. Other processes see all of it or nothing."""
     built = library()
-    if built.is_file():
+    if built.is_file() and built.stat().st_size:  # a power cut leaves an empty one
         return built
     compiler = _compiler()
     if compiler is None:

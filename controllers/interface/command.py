@@ -18,7 +18,7 @@ class Status(StrEnum):
     INVALID_SCENE = "invalid_scene"  # two things of one name, or one held by a frame that the robot lacks
     STALE_INTENT = "stale_intent"
     SOLVER_FAILED = "solver_failed"  # the robot follows what it was sent, or stops
-    BACKUP = "backup"  # the plan leaves no safe way out: the same
+    BACKUP = "backup"  # no way out of the plan is certified: the same, or the least bad motion
 
     @property
     def brakes(self) -> bool:

@@ -93,20 +93,20 @@ class Intents(Intent):
         values = np.zeros(size)
         for term in terms:
             term.add(term.source.intent.values, values)
-        times = [source.intent.time for source, _ in active] or [base.time]
+        asking = [source.intent for source, _ in active] or [base]
         mask = total > 0.0
         return cls(
             values=values if usable else np.full(size, np.nan),
             mask=mask if usable else np.ones(size, dtype=bool),
             grippers=grippers,
             mode=base.mode,
-            time=min(times),
+            time=min(each.time for each in asking),
             frames=base.frames,
             raw=base.raw,
             sources=tuple(sources) if usable else (),
             terms=terms,
             share=None if np.all(total[mask] == 1.0) else frozen(total),
-            last=max(times),
+            last=max(each.newest for each in asking),
         )
 
     @property

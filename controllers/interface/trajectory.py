@@ -42,7 +42,7 @@ class Trajectory:
     def after(self, time: float) -> "Trajectory":
         """Return what is left of it `time` [s] from now: the same curve, without knots long past."""
         passed = self.elapsed + max(time, 0.0)
-        whole = min(int(passed / self.dt), len(self.velocities) - 2)
+        whole = int(min(passed / self.dt, len(self.velocities) - 2))
         return Trajectory(self.velocities[whole:], self.dt, passed - whole * self.dt)
 
     def accelerations(self, count: int, time: float = 0.0) -> FloatArray:

@@ -48,7 +48,7 @@ class Supervisor:
             loop = loop._replace(surroundings=loop.surroundings.seen(distances))
         way = self._way(loop, state, plan, distances, halt=status in _UNHEARD)
         motion, planned = way.motion, way.planned > 0.0
-        if plan is not None and not planned:
+        if plan is not None and not (planned and way.violation.all <= 0.0):
             status = Status.BACKUP
         diagnostics = _diagnostics(plan, status, start, distances, loop.surroundings)
         grippers = _grippers(loop, intent, status, self.hands)
@@ -73,13 +73,10 @@ class Supervisor:
         sent, elapsed = state.sent(self.limiter.limits), loop.elapsed(state.time)
         situation = Situation(state.expected, sent, distances, loop.command, elapsed)
         lag = None if state.expected is state.q else state.q - state.expected
-        return self._backup(loop, lag).choose(situation, plan, halt)
-
-    def _backup(self, loop: LoopState, lag: FloatArray | None) -> Backup:
         settings = self.settings
         least, span = settings.margin_share * loop.surroundings.margins, settings.horizon * settings.dt
         certificate = Certificate(loop.surroundings.collision, least, span, lag)
-        return Backup(certificate, self.limiter, settings.dt)
+        return Backup(certificate, self.limiter, settings.dt).choose(situation, plan, halt)
 
     def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:
         """Return the signed distances now, (P,); None where nobody knows where the robot is."""

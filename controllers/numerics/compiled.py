@@ -33,7 +33,7 @@ def compiled(function: ca.Function) -> ca.Function:
     digest = hashlib.sha256(f"{compiler} {_FLAGS} {source}".encode()).hexdigest()[:24]
     try:
         library = user_folder("XDG_CACHE_HOME") / f"{function.name()}-{digest}.so"
-        if not library.is_file():
+        if not (library.is_file() and library.stat().st_size):  # a power cut leaves an empty one
             _build(source, library, compiler)
         return ca.external(function.name(), str(library))
     except (HandrailError, OSError, RuntimeError, subprocess.SubprocessError):

@@ -58,7 +58,7 @@ class MpcSettings:
         """
         usual = cls()
         lengths = {name: scale * getattr(usual, name) for name in _LENGTHS}
-        return cls(**lengths, **values)  # type: ignore[arg-type]
+        return cls(**(lengths | values))  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
         """Check the numbers."""

@@ -5,6 +5,9 @@ import pytest
 from ideal_robot import CHANNELS, HOME, MODEL, asking, roll
 
 from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.sources import Intents, IntentSource
 from handrail.controllers.mpc.blended import SHARE, BlendedMpc
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import Pose
@@ -71,3 +74,13 @@ def test_a_nan_of_the_operator_brakes_the_actor_too():
     assert np.abs(v[-1]).max() > 0.02
     assert commands[-1].diagnostics.status is Status.INVALID_INTENT
     np.testing.assert_allclose(stopped[-1], 0.0, atol=1e-9)
+
+
+def test_one_of_several_operators_from_the_future_brakes_it_too():
+    blend, mask = BlendedMpc(MODEL), CHANNELS.mask("ee")
+    blend.reset()
+    blend.aim(AHEAD)
+    near, far = (Intent(np.where(mask, 0.1, 0.0), mask, time=time) for time in (0.0, 10.0))
+    both = Intents.of([IntentSource("a", near, 0.5), IntentSource("b", far, 0.5)], (0.0,), near)
+    command = blend.update(State(HOME, np.zeros(len(HOME)), time=0.0), both)
+    assert command.diagnostics.status == Status.INVALID_INTENT

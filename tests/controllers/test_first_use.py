@@ -52,3 +52,17 @@ def test_without_a_compiler_the_numbers_are_the_same(told, tmp_path, monkeypatch
     for number in range(20):
         point = [0.1 * number, 2.0 - number, 0.3]
         assert fast(point).full().tolist() == slow(point).full().tolist()
+
+
+def test_a_library_that_a_power_cut_left_empty_is_compiled_anew(told, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("HANDRAIL_COMPILE", raising=False)
+    x = ca.SX.sym("x")
+    functions = [ca.Function("cubed", [x], [x * x * x]) for _ in range(2)]
+    if compiled(functions[0]) is functions[0]:
+        pytest.skip("no C compiler here")
+    (library,) = tmp_path.rglob("cubed-*.so")
+    library.unlink()  # not emptied: this process has it mapped
+    library.touch()
+    assert compiled(functions[1]) is not functions[1]
+    assert library.stat().st_size

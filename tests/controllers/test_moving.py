@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from ideal_robot import HOME, MODEL, PERIOD, Robot, intent
 
+from handrail.controllers.interface.command import Status
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.safety.backup import Backup
 
 SPEED = 0.5
 
@@ -46,3 +48,22 @@ def test_the_arm_moves_out_of_the_way_while_the_base_is_held():
     smallest, path = meet(ball, {}, ("base",), seconds=7.0)
     assert smallest > 0.0
     assert np.abs(path[:, :3] - HOME[:3]).max() < 0.3
+
+
+def test_what_is_not_certified_is_no_ok(monkeypatch):
+    """Something comes too near to be avoided: the least bad motion may be a part of the plan."""
+    chosen, choose = [], Backup.choose
+
+    def noted(self, situation, plan, halt=False):
+        chosen.append(choose(self, situation, plan, halt))
+        return chosen[-1]
+
+    monkeypatch.setattr(Backup, "choose", noted)
+    robot = Robot(MaskedMpc(MODEL), (pillar((HOME[0] + 1.2, HOME[1]), (-SPEED, 0.0)),))
+    for _ in range(60):
+        robot.update(intent({"base.vx": 0.6}, "base", time=robot.time))
+    unsafe = [each.violation.all > 0.0 for each in chosen]
+    planned = [way.planned > 0.0 for way, bad in zip(chosen, unsafe, strict=True) if bad]
+    assert any(planned)
+    statuses = [each.diagnostics.status for each, bad in zip(robot.commands, unsafe, strict=True) if bad]
+    assert set(statuses) == {Status.BACKUP}

@@ -66,3 +66,8 @@ def test_velocities_without_knots_are_refused(shape):
 
 def test_a_single_knot_is_held():
     np.testing.assert_array_equal(Trajectory(np.ones((1, 2)), 0.1).accelerations(3, 0.05), np.zeros((3, 2)))
+
+
+def test_a_clock_that_leaps_very_far_finds_it_at_rest():
+    left = Trajectory(np.zeros((3, 2)), 0.1).after(1e308)
+    np.testing.assert_array_equal(left.velocity(0.0), np.zeros(2))

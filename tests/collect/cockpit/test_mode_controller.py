@@ -9,6 +9,7 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_controller, build_env, build_modes
 from handrail.collect.session.mode_controller import ModeController
 from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.intent import Intent
 
 PERIOD = 0.05
@@ -41,3 +42,12 @@ def test_no_change_of_mode_jolts(env):
         before, fastest = v, max(fastest, float(np.abs(v).max()))
         env.plant.send(np.append(v, 0.0))
     assert fastest > 0.1
+
+
+def test_a_mask_of_no_size_brakes(env):
+    config = SessionConfig(task="reach", physics=False)
+    modes, build = build_modes(config, env), partial(build_controller, fps=20, task="reach")
+    controller = ModeController(modes, build, modes["ee"], env.model)
+    controller.reset(env.obstacles())
+    command = controller.update(env.state(), Intent(0.0, True, mode="direct", time=env.state().time))
+    assert command.diagnostics.status == Status.INVALID_INTENT

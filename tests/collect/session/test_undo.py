@@ -27,6 +27,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.reading.reader import read_frames
+from handrail.datasets.recording.writer import EpisodeWriter
 
 FPS, MODEL = 20, load_model()
 PAUSE, UNDO, SUCCESS = EpisodeEvent.PAUSE, EpisodeEvent.UNDO, EpisodeEvent.SUCCESS
@@ -193,3 +194,31 @@ def test_grippers_that_no_robot_has_brake(grippers):
     frame = loop.step(Intent(values, channels.mask("joint"), time=loop.now.view.state.time))
     assert frame.action.tolist() == [0.0] * env.model.size + before
     env.close()
+
+
+class Beat:
+    """Notes how many frames were written in each period."""
+
+    def __init__(self):
+        self.written = [0]
+
+    def begin(self, env, seed):
+        pass
+
+    def see(self, frame):
+        self.written.append(0)
+
+
+def test_to_go_on_after_a_pause_writes_little_at_once(tmp_path, monkeypatch):
+    """The loop waits for it, with pictures for a second."""
+    beat, add = Beat(), EpisodeWriter.add_frame
+
+    def counted(self, *words):
+        beat.written[-1] += 1
+        add(self, *words)
+
+    monkeypatch.setattr(EpisodeWriter, "add_frame", counted)
+    plan = [(FORTH, 40), (PAUSE, 30), (LEFT, 30), (SUCCESS, 1)]
+    frames, outcome = recorded(tmp_path / "d", plan, IdealRobot, watchers=[beat])
+    assert sum(beat.written) == len(frames["action"]) == outcome.frames
+    assert 1 < max(beat.written[:-1]) <= 4
