@@ -144,3 +144,7 @@ def test_a_longer_horizon_is_a_setting():
     np.testing.assert_array_less(np.diff(np.abs(command.velocities[1:]), axis=0), 1e-12)
     np.testing.assert_array_equal(command.velocities[-1], 0.0)  # a command ends at rest
     assert command.dt == 0.08
+
+
+def test_a_length_that_is_given_is_not_scaled():
+    assert MpcSettings.of(0.3, margin=0.05).margin == 0.05
