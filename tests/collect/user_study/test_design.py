@@ -113,20 +113,24 @@ def test_a_participant_under_other_versions_is_said(tmp_path, monkeypatch, capsy
         assert (expected in said) == ("other versions" in said) == bool(changed)
 
 
-def ran(monkeypatch, folder, what):
-    """Run a session whose conductor says or raises something."""
+def ran(monkeypatch, folder, what, at_close=None):
+    """Run a session whose conductor says or raises something; so may the end of its server."""
 
     class Fake:
         def __init__(self, *_):
-            pass
+            self.pipe = self
 
         def run(self):
             if isinstance(what, BaseException):
                 raise what
             return what
 
-        def close(self):
+        def send_surely(self, *_):
             pass
+
+        def close(self):
+            if at_close:
+                raise at_close
 
     for name in ("open_server", "Conductor", "Cards"):
         monkeypatch.setattr(run, name, Fake)
@@ -135,13 +139,9 @@ def ran(monkeypatch, folder, what):
 
 
 def test_a_refusal_that_is_interrupted_leaves_nothing(tmp_path, monkeypatch):
-    def interrupted(seconds):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(run.time, "sleep", interrupted)
     study_folder(tmp_path).freeze()
     with pytest.raises(KeyboardInterrupt):
-        ran(monkeypatch, tmp_path, Ending.REFUSED)
+        ran(monkeypatch, tmp_path, Ending.REFUSED, at_close=KeyboardInterrupt())
     assert not list((tmp_path / "participants").iterdir())
 
 
